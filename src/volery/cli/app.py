@@ -15,7 +15,7 @@ from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
 from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
-from volery.cli.options import PageCommand
+from volery.cli.options import PageCommand, ServeCommand
 from volery.cli.radio_commands import comms, gcs
 from volery.cli.study_commands import sweep
 from volery.cli.terminal import echo_lines
@@ -59,8 +59,8 @@ def volery(
 app.command(cls=PageCommand)(run)
 app.command("list")(list_scenarios)
 app.command(context_settings={"ignore_unknown_options": True})(examples)
+app.command(cls=ServeCommand)(serve)
 for _command in (
-    serve,
     play,
     sweep,
     info,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -86,9 +87,42 @@ GroupSizeOption = Annotated[
 ]
 
 
+_ADDRESS = re.compile(r"(\S+:)?\d+")
+"""PORT or HOST:PORT."""
+
+
 class PageCommand(TyperCommand):
-    """Accepts `--page` as well as `--page=HOST:PORT`; typer supports only the latter."""
+    """Accepts `--page`, `--page ADDRESS` and `--port N` as well; typer only `--page=ADDRESS`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Implements typer's method for the arguments of the command line."""
-        return super().parse_args(ctx, ["--page=" if word == "--page" else word for word in args])
+        words = [word.replace("--port=", "--page=") for word in _with_addresses(args)]
+        return super().parse_args(ctx, ["--page=" if word == "--page" else word for word in words])
+
+
+class ServeCommand(TyperCommand):
+    """Accepts `--page=ADDRESS` as well, like `volery run`, for `--host` and `--port`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Implements typer's method for the arguments of the command line."""
+        words: list[str] = []
+        for word in _with_addresses(args):
+            option, _, address = word.partition("=")
+            if option != "--page":
+                words.append(word)
+                continue
+            host, colon, port = address.rpartition(":")
+            words += [f"--host={host.strip('[]')}"] if colon else []
+            words += [f"--port={port}"] if port else []
+        return super().parse_args(ctx, words)
+
+
+def _with_addresses(args: list[str]) -> list[str]:
+    """Joins `--page` and `--port` with an address that follows, by `=`."""
+    words: list[str] = []
+    for word in args:
+        if words and words[-1] in ("--page", "--port") and _ADDRESS.fullmatch(word):
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words

@@ -60,8 +60,9 @@ def follow_pose(
     it is simulated time, else the time of arrival does, and the jitter of arrival is smoothed.
     in_stream: whether the last command was a pose, too. step: of arrival; dt: physics step, s.
     Returns whether the pose is the present one: a pose that is older than the last one is not. A
-    pose that repeats a moving UAV's last one, as engines send it that draw faster than they move,
-    ends the motion only if no other one follows.
+    change that no airframe can fly is a teleport: the motion of before goes on beyond it. A pose
+    that repeats a moving UAV's last one, as engines send it that draw faster than they move, ends
+    the motion only if no other one follows.
     """
     last_ns = int(control_state["pose_stamp"]) if in_stream else NO_STAMP
     stamp_ns = _trusted(stamp_ns, last_ns, round(step * dt * NS_PER_S))
@@ -83,15 +84,16 @@ def follow_pose(
     period_s = max(gap_s, dt if is_timed else _MIN_PERIOD_S)
     control_state["start_step"] = step
     control_state["pose_stamp"] = stamp_ns
-    if not in_stream or gap_s > _MAX_GAP_S or _is_teleport(way, turn, period_s, limits):
+    if not in_stream or gap_s > _MAX_GAP_S:
         control_state["velocity_target"] = control_state["rates"] = 0.0
         control_state["pose_steps"] = 0
         control_state["deadline_step"] = NO_DEADLINE
         return True
-    if is_timed:
+    is_measured = not _is_teleport(way, turn, period_s, limits)
+    if is_measured and is_timed:
         control_state["velocity_target"] = way / gap_s
         control_state["rates"] = turn / gap_s
-    else:
+    elif is_measured:
         # A first-order filter. Poses that arrive together share the time since those before.
         share = 1.0 - math.exp(-gap_s / _SMOOTHING_S)
         if gap_s > 0.0:

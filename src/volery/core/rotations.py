@@ -6,7 +6,7 @@ Functions take arrays whose last axis is the quaternion or vector and broadcast 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -116,6 +116,19 @@ def yaw_of(q: ArrayLike) -> Array:
     """Returns the heading about the map's z axis, rad, shape (...)."""
     x, y, z, w = _components(q)
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+def heading_of(q: Iterable[float]) -> float | None:
+    """Returns the heading, rad, of a quaternion (4,) of any length, as `tf2::getYaw` does.
+
+    None for a quaternion of length 0, which messages without an orientation have.
+    """
+    x, y, z, w = map(float, q)
+    if not (x or y or z or w):
+        return None
+    largest = max(abs(x), abs(y), abs(z), abs(w))
+    x, y, z, w = x / largest, y / largest, z / largest, w / largest
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
 def exponential(rotation_vector: ArrayLike) -> Array:

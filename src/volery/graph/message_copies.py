@@ -12,6 +12,7 @@ may modify them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence, Set
 from dataclasses import fields
 from enum import Enum
@@ -26,8 +27,9 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
 from volery.graph.lazy_list import LazyList
 from volery.graph.message_defaults import is_plain_name
-from volery.graph.message_numbers import numbers_of
+from volery.graph.message_numbers import MOST_FLOAT32, numbers_of, with_sign
 from volery.graph.number_sequence import received
+from volery.graph.octet import Octet
 from volery.graph.typestore import typestore
 
 Copy = Callable[[Any], Any]
@@ -66,8 +68,17 @@ class _Purpose(Enum):
 _CHECKED, _RECEIVED, _LOOKED_AT = _Purpose
 _OTHER_TYPE, _NO_FIELD = _OF_MESSAGES = ("must be a message of type", "has no field")
 """What errors say about a message as a whole, after its type or path."""
-_USUAL = {"float32": "float", "float64": "float", "string": "str", "bool": "bool"}
-"""Python's class of a base type whose every value fits."""
+_USUAL = {
+    "float32": f"float and -{MOST_FLOAT32} <= v <= {MOST_FLOAT32}",
+    "float64": "float",
+    "string": "str and v.isascii()",  # other text may have half a surrogate pair
+    "bool": "bool",
+}
+"""Class of the usual values `v` of a base type, with a condition; they fit."""
+
+
+_MADE_FOR_NODES: dict[str, Copy] = {"byte": Octet}
+"""What makes the values of base types that nodes receive as another class."""
 
 
 @cache
@@ -92,9 +103,6 @@ def _copier(msgtype: str, purpose: _Purpose) -> Copy:
             f"_copy_{name}(message.{name})"
             if usual is None
             else f"(v if (v := message.{name}).__class__ is {usual} else _copy_{name}(v))"
-            if usual != "str"  # a text beyond ASCII may have half a surrogate pair
-            else f"(v if (v := message.{name}).__class__ is str and v.isascii() "
-            f"else _copy_{name}(v))"
         )
     most = len(described)
     is_odd = f"message.__class__ is not _cls or len(message.__dict__) > {most}"
@@ -123,7 +131,8 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     """Returns the function that copies a field; None where its value is immutable."""
     kind, detail = described
     if kind == Nodetype.BASE:
-        return None if purpose is _RECEIVED else _base_checker(where, detail[0])
+        base = detail[0]
+        return _MADE_FOR_NODES.get(base) if purpose is _RECEIVED else _base_checker(where, base)
     if kind == Nodetype.NAME:
         return partial(_nested, where, detail, _copier(detail, purpose))
     (inner, inner_detail), size = detail
@@ -135,10 +144,12 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     if inner_detail[0] == "string":
         check = None if purpose is _RECEIVED else _base_checker(where, "string")
         return partial(_copy_list, where, "", check, False)
+    base = inner_detail[0]
     if purpose is _RECEIVED:
         return received if kind == Nodetype.SEQUENCE else _writeable
     copy = _look_at_numbers if purpose is _LOOKED_AT else numbers_of
-    return partial(copy, where, DTYPES[inner_detail[0]], length)
+    numbers = partial(copy, where, DTYPES[base], length)
+    return (lambda values: numbers(with_sign(values))) if base == "byte" else numbers
 
 
 def _base_checker(where: str, base: str) -> Copy:
@@ -148,7 +159,8 @@ def _base_checker(where: str, base: str) -> Copy:
     if base == "bool":
         return partial(_check_value, where, base, (bool, np.bool_), None)
     if base in ("float32", "float64"):
-        return partial(_check_value, where, base, (float, int, np.floating, np.integer), None)
+        is_number = partial(_check_value, where, base, (float, int, np.floating, np.integer), None)
+        return is_number if base == "float64" else partial(_check_float32, where, is_number)
     if base == "byte":
         return partial(_check_byte, where)
     limits = np.iinfo(DTYPES[base])
@@ -164,6 +176,13 @@ def _check_value(
         )
     if limits is not None and not limits[0] <= value <= limits[1]:
         raise GraphError(f"{where} must be {_kind(base)}, {limits[0]} to {limits[1]}, not {value}")
+    return value
+
+
+def _check_float32(where: str, is_number: Copy, value: Any) -> Any:
+    is_number(value)
+    if MOST_FLOAT32 < abs(value) < math.inf:
+        raise GraphError(f"{where} must be a float32, at most {MOST_FLOAT32:.7g}, not {value}")
     return value
 
 
@@ -185,7 +204,7 @@ def _check_byte(where: str, value: Any) -> Any:
     if isinstance(value, bytes) and len(value) == 1:
         value = value[0]
     number = _check_value(where, "byte", (int, np.integer), (-128, 255), value)
-    return number - 256 if number > 127 else number
+    return int(number) - 256 if number > 127 else int(number)
 
 
 def _nested(where: str, msgtype: str, copy: Copy, value: Any) -> Any:

@@ -19,6 +19,8 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
+from volery.graph.octet import Octet
+
 Maker = Callable[[], Any]
 DefaultOf = Callable[[str, str], Any]
 """Default of a type's field in its definition file; None: zero."""
@@ -106,7 +108,8 @@ def _maker(described: Any, default: Any, types: Mapping[str, type[Any]]) -> tupl
         return types[detail], False
     if kind == Nodetype.BASE:
         zero = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(detail[0], 0)
-        value = zero if default is None else default
+        given: Any = zero if default is None else default
+        value = Octet(given) if detail[0] == "byte" else given
         return lambda: value, True
     return _sequence_maker(kind, detail, default, types), False
 

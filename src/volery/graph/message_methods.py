@@ -14,6 +14,7 @@ from rosbags.interfaces import Nodetype
 
 from volery.graph.codecs.definition_budget import EMPTY_MEMBER
 from volery.graph.number_sequence import NumberSequence
+from volery.graph.octet import Octet
 
 _IDL_NAMES = {
     "bool": "boolean",
@@ -46,6 +47,9 @@ def add_methods(name: str, cls: Any, fielddefs: Any) -> None:
             return getattr(self, attribute[1:])
         raise AttributeError(f"'{cls.__name__}' object has no attribute '{attribute}'")
 
+    for constant, base, value in fielddefs[name][0]:
+        if base == "byte":
+            setattr(cls, constant, Octet(value))
     cls.__eq__, cls.__repr__ = is_equal, text
     cls.__getattr__ = find
     cls.__slots__ = _Slots(names)

@@ -25,6 +25,20 @@ _CLASSES: dict[str, tuple[type, ...]] = {
 }
 
 
+MOST_FLOAT32 = 3.4028235677973362e38
+"""Largest number that rounds to a float32; rclpy refuses larger ones, too."""
+
+
+def with_sign(values: Any) -> Any:
+    """Returns the values of a `byte[]`, which may be octets, as int8 where they are bytes."""
+    if isinstance(values, array.array):
+        values = np.array(values)
+    if isinstance(values, bytes | bytearray | memoryview):
+        values = np.frombuffer(bytes(values), np.uint8)
+    is_octets = isinstance(values, np.ndarray) and values.dtype == np.uint8
+    return values.view(np.int8) if is_octets else values
+
+
 def numbers_of(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDArray[Any]:
     """Returns a read-only array; a read-only one of the field's type is returned itself.
 
@@ -87,17 +101,20 @@ def _array_of_list(where: str, dtype: np.dtype[Any], values: list[Any]) -> NDArr
             f"{where}[{place}] must be a number of {dtype}, not {odd!r:.80} ({type(odd).__name__})"
         )
     try:
-        return np.array(values, dtype if dtype.kind in "fb" else None).reshape(len(values))
+        kind = {"f": np.float64, "b": np.bool_}.get(dtype.kind)
+        return np.array(values, kind).reshape(len(values))
     except (ValueError, TypeError, OverflowError) as error:
         raise GraphError(f"{where}: {error}") from None
 
 
 def _check_range(where: str, dtype: np.dtype[Any], values: NDArray[Any]) -> None:
+    if dtype == np.float32 and values.dtype.kind == "f":
+        odd = values[(np.abs(values) > MOST_FLOAT32) & (np.abs(values) < np.inf)]
+        if len(odd):
+            raise GraphError(f"{where} must be float32, at most {MOST_FLOAT32:.7g}, not {odd[0]}")
     if dtype.kind not in "iu" or not values.size:
         return
     limits = np.iinfo(dtype)
-    if dtype == np.int8 and values.dtype == np.uint8:  # `byte`
-        return
     least, most = values.min(), values.max()
     if least < limits.min or most > limits.max:
         odd = least if least < limits.min else most

@@ -26,18 +26,26 @@ class Within(NamedTuple):
 
     min_value: float
     max_value: float = math.inf
+    step: float = 0.0
+    """Distance of the allowed numbers from `min_value` on; `max_value` is allowed too. 0: any."""
 
     def holds(self, value: Any) -> bool:
         """Returns whether a number is within the limits."""
-        return bool(self.min_value <= value <= self.max_value and value < math.inf)
+        inside = self.min_value <= value <= self.max_value and value < math.inf
+        return bool(inside and (not self.step or value == self.max_value or self._is_step(value)))
 
     def __str__(self) -> str:
         """Returns the limits for an error message."""
-        return (
+        limits = (
             f"{self.min_value:g} to {self.max_value:g}"
             if self.max_value < math.inf
             else f"{self.min_value:g} or more"
         )
+        return f"{limits} in steps of {self.step:g}" if self.step else limits
+
+    def _is_step(self, value: float) -> bool:
+        nearest = self.min_value + round((value - self.min_value) / self.step) * self.step
+        return math.isclose(nearest, value, rel_tol=1e-9, abs_tol=1e-9 * self.step)
 
 
 class ParameterNotDeclaredError(GraphError):
@@ -210,11 +218,11 @@ class Parameter(ParameterSetting):
         if self._within is not None:
             whole = self.type_ is ParameterType.INTEGER
             kind = "IntegerRange" if whole else "FloatingPointRange"
-            least, most = self._within
+            least, most, step = self._within
             if not whole or most < math.inf:
-                limits = (int(least), int(most)) if whole else (float(least), float(most))
+                number: Any = int if whole else float
                 bounds = message_type(f"rcl_interfaces/msg/{kind}")(
-                    from_value=limits[0], to_value=limits[1]
+                    from_value=number(least), to_value=number(most), step=number(step)
                 )
                 getattr(descriptor, "integer_range" if whole else "floating_point_range").append(
                     bounds

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from volery.core.errors import CommandError
-from volery.core.rotations import conjugate, rotate, yaw_of
+from volery.core.rotations import conjugate, heading_of, rotate
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
     BatteryState,
@@ -210,8 +210,8 @@ class Mavros:
 
     def _place(self, message: Any) -> OffboardSetpoint:
         q = message.pose.orientation
-        turn = [q.x, q.y, q.z, q.w]
-        yaw = float(yaw_of(turn)) if 0.5 < math.hypot(*turn) < 2.0 else math.nan
+        yaw = heading_of((q.x, q.y, q.z, q.w))
+        yaw = math.nan if yaw is None else yaw
         return _checked(OffboardSetpoint(position=self._in_map(message.pose.position), yaw=yaw))
 
     def _raw(self, message: Any) -> OffboardSetpoint:

@@ -93,7 +93,8 @@ class ScenarioAccess:
             else [(folder / name).parent.resolve() for folder in folders]
         )
         shown = ", ".join(dict.fromkeys(str(folder) for folder in looked))
-        raise DataFileError(f"no {what} '{name}' (looked in {shown})")
+        advice = "; write / between folders" if "\\" in name else ""
+        raise DataFileError(f"no {what} '{name}' (looked in {shown}){advice}")
 
 
 def _is_inner(name: str) -> bool:

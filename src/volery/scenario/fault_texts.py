@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from volery.core.near_names import near_miss
+
 _TABLE, _LIST = "a table is needed", "a list is needed, in brackets"
 _NUMBER, _WHOLE_NUMBER = "a number is needed", "a whole number is needed"
 _TEXT, _TRUTH = "a text is needed, in quotes", "true or false is needed"
@@ -50,6 +52,10 @@ def fault_text(fault: Mapping[str, Any]) -> str:
     context = fault.get("ctx", {})
     if fault["type"] == "string_pattern_mismatch" and context["pattern"] in _PATTERNS:
         return _PATTERNS[context["pattern"]]
+    if fault["type"] == "union_tag_invalid":
+        allowed = [each.strip(" '") for each in context["expected_tags"].split(",")]
+        hint = near_miss(context["tag"], allowed)
+        return f"no '{context['tag']}'{hint} Allowed: {', '.join(allowed)}"
     text = _TEXTS.get(fault["type"])
     if text is None:
         return str(fault["msg"]).removeprefix("Value error, ")

@@ -57,8 +57,10 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
         allowed = _sibling_keys(model, fault["loc"])
         hint = near_miss(fault["loc"][-1], allowed)
         return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
-    if fault["type"] == "missing":
-        return f"key '{key}' is missing"
+    if fault["type"] == "union_tag_invalid":
+        return f"key '{key}.kind': {message}"
+    if fault["type"] in ("missing", "union_tag_not_found"):
+        return f"key '{key}{'' if fault['type'] == 'missing' else '.kind'}' is missing"
     if not key:
         return message
     one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)

@@ -149,13 +149,13 @@ def test_headers_without_a_stamp_and_times_that_are_now_get_the_present_time(ben
     present = divmod(TIME_NS, 10**9)
     seen = []
     bench.graph.subscribe("/path", seen.append, "nav_msgs/msg/Path")
-    given = ({"frame_id": "a"}, {"stamp": "now"}, "auto", {"stamp": {}})
+    given = ({"frame_id": "a"}, {"stamp": "now"}, "auto", {"stamp": {}}, {"stamp": None})
     poses = [*({"header": header} for header in given), {}]
     client.send("publish", topic="/path", msg={"header": {"stamp": {"secs": 3}}, "poses": poses})
     path = seen[0].message
     assert path.header.stamp.sec == 3
     stamps = [(pose.header.stamp.sec, pose.header.stamp.nanosec) for pose in path.poses]
-    assert stamps == [present, present, present, present, (0, 0)]
+    assert stamps == [present, present, present, present, present, (0, 0)]
     assert path.poses[0].header.frame_id == "a"
     bench.graph.subscribe("/stamp", seen.append, "std_msgs/msg/Header")
     client.send("publish", topic="/stamp", msg={"stamp": "now", "frame_id": "b"})
@@ -163,6 +163,19 @@ def test_headers_without_a_stamp_and_times_that_are_now_get_the_present_time(ben
     assert (stamp.sec, stamp.nanosec) == present
     client.send("publish", topic="/stamp", msg={"stamp": "later"}, id="p")
     assert "stamp must be an object, not 'later'" in client.read()[0]["msg"]
+
+
+def test_the_header_of_roslibpy_has_a_stamp_of_null(bench, client):
+    import roslibpy
+
+    seen = []
+    bench.graph.subscribe("/goal", seen.append, "geometry_msgs/msg/PoseStamped")
+    client.send("advertise", topic="/goal", type="geometry_msgs/PoseStamped")
+    for header in (dict(roslibpy.Header(frame_id="map")), {"stamp": 0, "frame_id": "map"}):
+        client.send("publish", topic="/goal", msg={"header": header})
+        found = seen.pop().message.header
+        assert (found.stamp.sec, found.stamp.nanosec) == divmod(TIME_NS, 10**9)
+        assert found.frame_id == "map"
 
 
 def test_subscriptions_of_one_topic_share_a_stream(bench, client):

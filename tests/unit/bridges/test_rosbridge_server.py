@@ -218,7 +218,7 @@ def test_who_leaves_is_forgotten(simulation, server):
         client.synchronize()
         assert simulation.graph.has_service("/do")
     until(lambda: not simulation.graph.has_service("/do"))
-    assert [s.name for s in simulation.gateway.sessions()] == ["rosapi"]
+    until(lambda: [s.name for s in simulation.gateway.sessions()] == ["rosapi"])
     until(lambda: server.clients == 0)
 
 

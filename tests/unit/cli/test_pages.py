@@ -5,7 +5,7 @@ import socket
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli import run
+from volery.cli import run, serve
 from volery.cli.app import app
 from volery.cli.flight import RunOptions
 from volery.cli.pages import _is_taken, _settings_of
@@ -34,11 +34,33 @@ def page_of(monkeypatch):
         (["--page", "hover"], "", 1.0),
         (["hover", "--page=127.0.0.1:8081", "--speed", "2"], "127.0.0.1:8081", 2.0),
         (["hover", "--page", "--bridge", "rosbridge"], "", 1.0),
+        (["--page", "8091", "hover"], "8091", 1.0),
+        (["hover", "--page", "[::1]:8091"], "[::1]:8091", 1.0),
+        (["hover", "--port", "8091"], "8091", 1.0),
+        (["hover", "--port=8091"], "8091", 1.0),
     ],
 )
 def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, speed):
     options = page_of(*words)
     assert (options.scenario, options.page, options.speed) == ("hover", page, speed)
+
+
+@pytest.mark.parametrize(
+    ("words", "host", "port"),
+    [
+        (["--port", "8091"], "127.0.0.1", 8091),
+        (["--page=8091"], "127.0.0.1", 8091),
+        (["--page", "8091"], "127.0.0.1", 8091),
+        (["--page=[::1]:8091"], "::1", 8091),
+        (["--host", "::1", "--page", "--port=8091"], "::1", 8091),
+    ],
+)
+def test_serve_takes_the_option_of_run(monkeypatch, words, host, port):
+    found = []
+    monkeypatch.setattr(serve, "serve", lambda options: found.append(options.page))
+    result = CliRunner().invoke(app, ["serve", "hover", *words])
+    assert result.exit_code == 0, result.output
+    assert (found[0].host, found[0].port) == (host, port)
 
 
 @pytest.mark.parametrize(

@@ -402,6 +402,7 @@ def test_poses_that_only_repeat_end_the_motion():
 def test_a_teleport_is_no_speed(stamped):
     fleet = flying(KINEMATIC)
     fastest = felt = 0.0
+    felt_later = []
     for k in range(100):
         x = 0.04 * k + (100.0 if k >= 50 else 0.0)
         stamp = {"stamp_ns": k * NS_PER_S // 50} if stamped else {}
@@ -412,9 +413,25 @@ def test_a_teleport_is_no_speed(stamped):
             fastest = max(fastest, float(np.linalg.norm(fleet.state.velocity_map[0])))
             felt = max(felt, float(np.linalg.norm(fleet.state.acceleration_map[0])))
             assert np.linalg.norm(fleet.state.omega_body[0]) < 1e-9
+            felt_later += [float(np.linalg.norm(fleet.state.acceleration_map[0]))] * (k > 20)
     assert fastest < 2.01
     assert felt < 110.0  # from rest to 2 m/s within a period
+    assert max(felt_later) < 2.0  # the motion goes on beyond both teleports
     assert fleet.state.velocity_map[0, 0] == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_teleport_to_rest_ends_the_motion():
+    """As any end of a motion: without a spike."""
+    fleet = flying(KINEMATIC)
+    felt = []
+    for k in range(100):
+        x = 0.04 * k if k < 50 else 300.0
+        fleet.command_pose(0, (x, 0, 50), LEVEL, stamp_ns=k * NS_PER_S // 50)
+        for _ in range(20):
+            fleet.advance(1, FLAT.grid)
+            felt += [float(np.linalg.norm(fleet.state.acceleration_map[0]))] * (k > 20)
+    np.testing.assert_array_equal(fleet.state.velocity_map[0], 0.0)
+    assert max(felt) < 25.0  # from 2 m/s in a tenth of a second
 
 
 @pytest.mark.parametrize(("speed", "kind"), [(0.5, "touch_down"), (5.0, "impact")])

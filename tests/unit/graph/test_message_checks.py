@@ -2,16 +2,18 @@
 
 import array
 import math
+import sys
 from collections import deque
 
 import numpy as np
 import pytest
 
 from volery.core.errors import GraphError
-from volery.graph.message_copies import copy_message, message_checker
+from volery.graph.message_copies import copy_message, message_checker, receive_message
 from volery.graph.messages import (
     Image,
     LaserScan,
+    OccupancyGrid,
     PathMessage,
     Pose,
     PoseStamped,
@@ -22,6 +24,8 @@ from volery.graph.messages import (
     Vector3,
     message_type,
 )
+
+FLOAT = message_type("std_msgs/msg/Float32")
 
 
 def with_field(message, **values):
@@ -59,6 +63,13 @@ def nested():
             lambda: Twist(linear=with_field(Vector3(), w=1.0)),
             "Twist: linear has no field 'w'; fields: x, y, z",
         ),
+        (lambda: OccupancyGrid(data=np.array([100, 200], np.uint8)), "-128 to 127, not 200"),
+        (lambda: OccupancyGrid(data=array.array("B", [255])), "data must be int8, -128 to 127"),
+        (lambda: OccupancyGrid(data=b"\xff"), "data must be int8, -128 to 127, not 255"),
+        (lambda: FLOAT(data=1e300), "data must be a float32, at most 3.402824e+38, not 1e+300"),
+        (lambda: FLOAT(data=-(10**40)), "data must be a float32, at most"),
+        (lambda: LaserScan(ranges=[1.0, sys.float_info.max]), "ranges must be float32, at most"),
+        (lambda: LaserScan(ranges=np.array([-1e39, 1.0])), "ranges must be float32, at most"),
         (lambda: Image(is_bigendian=300), "0 to 255, not 300"),
         (lambda: message_type("std_msgs/msg/Bool")(data=1), "must be a bool"),
         (nested, "nav_msgs/msg/Path: poses[1].pose.position.x must be a float64, not 'far'"),
@@ -116,6 +127,14 @@ def test_what_fits():
         Image(data=[True, np.uint8(2)]),
         Image(data=[]),
         LaserScan(ranges=np.arange(3)),
+        LaserScan(ranges=[math.inf, -math.inf, math.nan, 3.4028235e38]),
+        LaserScan(ranges=np.array([math.inf, math.nan, -3.4028235e38])),
+        FLOAT(data=math.inf),
+        FLOAT(data=math.nan),
+        FLOAT(data=-3.4028235e38),
+        OccupancyGrid(data=np.array([100, 0], np.uint8)),
+        OccupancyGrid(data=b"\x64"),
+        message_type("std_msgs/msg/ByteMultiArray")(data=np.array([200], np.uint8)),
     ):
         assert copy_message(message) is not message
         message_checker(message.__msgtype__)(message)
@@ -144,3 +163,19 @@ def test_a_byte_is_bytes_or_a_number(level):
     assert copy_message(many).data.tolist() == [1, 2]
     with pytest.raises(GraphError, match="level must be a byte"):
         copy_message(status(level=b"no"))
+
+
+def test_a_node_treats_a_byte_as_number_and_as_bytes():
+    status = message_type("diagnostic_msgs/msg/DiagnosticStatus")
+    found = receive_message(copy_message(status(level=status.WARN)))
+    assert found.level == status.WARN == 1
+    assert found.level == b"\x01" == status.WARN
+    assert found.level != b"\x02"
+    assert found.level != status.ERROR
+    assert int.from_bytes(found.level, "little") == found.level[0] == 1
+    assert {1: "warned"}[found.level] == "warned"
+    assert status().level == status.OK == b"\x00"
+    assert not status().level
+    assert copy_message(status(level=found.level)).level == 1
+    far = receive_message(copy_message(status(level=b"\xff")))
+    assert (far.level, bytes(far.level)) == (-1, b"\xff")

@@ -138,6 +138,27 @@ def test_levels_once_throttle_and_children(made, caplog):
     assert (child.warning("w"), child.error("e")) == (False, True)
 
 
+@pytest.mark.parametrize(
+    ("kind", "limits", "good", "bad"),
+    [
+        ("integer", (0, 12, 5), (0, 5, 10, 12), (7, 11, 13, -5)),
+        ("floating_point", (-1.0, 1.0, 0.1), (-1.0, -0.7, 0.3, 1.0), (0.05, 0.31)),
+        ("floating_point", (0.0, 1.0, 0.0), (0.05, 0.31), (1.1,)),
+    ],
+)
+def test_a_parameter_keeps_the_steps_of_its_range(made, kind, limits, good, bad):
+    _, node = made
+    names = {"integer": "IntegerRange", "floating_point": "FloatingPointRange"}
+    bounds = message_type(f"rcl_interfaces/msg/{names[kind]}")(*limits)
+    descriptor = message_type("rcl_interfaces/msg/ParameterDescriptor")
+    node.declare_parameter("p", limits[0], descriptor(**{f"{kind}_range": [bounds]}))
+    for value in good:
+        assert node.set_parameters([Setting("p", value=value)])[0].successful, value
+    for value in bad:
+        assert not node.set_parameters([Setting("p", value=value)])[0].successful, value
+    assert getattr(node.describe_parameter("p"), f"{kind}_range")[0].step == limits[2]
+
+
 def test_parameters_as_in_rclpy(made):
     _, node = made
     descriptor = message_type("rcl_interfaces/msg/ParameterDescriptor")

@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pytest
 from ros_tcp_client import frame
 from rosbridge_bench import TIME_NS
@@ -10,6 +11,7 @@ from rosbridge_bench import TIME_NS
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.wire import RosTcpFrameParser
 from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
+from volery.core import rotations
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import TOPIC, TYPE
@@ -76,6 +78,35 @@ def test_a_goal_in_the_map_with_a_slash(flying):
     assert told_about(flying, "/uav1/goal_pose", goal("/map")) == ([], [])
     flying.run(10.0)
     assert flying.uavs["uav1"].position_map[0] == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("z", "w", "degrees"), [(1.0, 1.0, 90.0), (0.1, 0.1, 90.0), (-0.7, 0.7, -90.0), (0.0, 3.0, 0.0)]
+)
+def test_a_goal_has_the_heading_of_its_quaternion_whatever_its_length(flying, z, w, degrees):
+    message = goal()
+    message.pose.orientation.z, message.pose.orientation.w = z, w
+    assert told_about(flying, "/uav1/goal_pose", message) == ([], [])
+    flying.run_until(lambda: abs(heading_deg(flying) - degrees) < 2.0, timeout_s=30.0)
+    flying.run(1.0)
+    assert heading_deg(flying) == pytest.approx(degrees, abs=2.0)
+
+
+def heading_deg(flying):
+    return float(np.degrees(rotations.yaw_of(flying.uavs["uav1"].attitude)))
+
+
+def test_a_trajectory_has_the_heading_of_its_quaternion(flying):
+    message = zero_message("trajectory_msgs/msg/MultiDOFJointTrajectory")
+    point = zero_message("trajectory_msgs/msg/MultiDOFJointTrajectoryPoint")
+    transform = zero_message("geometry_msgs/msg/Transform")
+    transform.translation.x, transform.translation.z = 2.0, 3.0
+    transform.rotation.z = transform.rotation.w = 0.65  # 0.92 long
+    point.transforms, point.time_from_start.sec = [transform], 4
+    message.points = [point]
+    assert told_about(flying, "/uav1/trajectory", message) == ([], [])
+    flying.run(8.0)
+    assert heading_deg(flying) == pytest.approx(90.0, abs=2.0)
 
 
 def test_a_trajectory_without_rotation(flying):

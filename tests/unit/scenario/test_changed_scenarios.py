@@ -38,7 +38,7 @@ def test_lists_models_and_tables_of_another_kind_replace():
         ({"sed": 7}, r"^hover: unknown key 'sed'; did you mean 'seed'\?"),
         ({"seed": -1}, r"^hover: key 'seed': .* \(found -1\)$"),
         ({"world": {"wind": {"turbulence": "mild"}}}, r"key 'world\.wind\.turbulence': .*'light'"),
-        ({"world": {"forest": {}}}, r"key 'world\.forest'"),
+        ({"world": {"forest": {}}}, r"key 'world\.forest\.kind' is missing"),
     ],
 )
 def test_wrong_changes_are_refused_with_the_key(changes, message):

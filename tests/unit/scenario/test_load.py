@@ -47,6 +47,11 @@ def broken(path, value):
         (broken(["seed"], "one"), ["seed", "a whole number", "'one'"]),
         (broken(["types", "t", "sensors", 0, "kind"], "radar"), ["radar", "lidar", "imu"]),
         (
+            broken(["types", "t", "sensors", 0, "kind"], "gps"),
+            ["sensors[0].kind': no 'gps'; did you mean 'gnss'? Allowed: lidar, "],
+        ),
+        (broken(["types", "t", "sensors", 0], {}), ["key 'types.t.sensors[0].kind' is missing"]),
+        (
             broken(["types", "t", "sensors"], [{"kind": "lidar"}, {"kind": "lidar"}]),
             ["sensor names must differ", "horizontal"],
         ),

@@ -42,7 +42,7 @@ def test_all_of_it():
         ({"w20_m_s": -1}, ["world.wind.w20_m_s", "a number of at least 0"]),
         ({"field": "a.csv", "velocity_m_s": [1, 0, 0]}, ["field replaces velocity_m_s"]),
         ({"field": "a.csv", "profile": {"kind": "log"}}, ["field replaces"]),
-        ({"profile": {"kind": "linear"}}, ["world.wind.profile", "'log', 'power'"]),
+        ({"profile": {"kind": "linear"}}, ["world.wind.profile", "log, power"]),
         ({"profile": {"kind": "log", "roughnes_m": 1}}, ["roughnes_m", "mean 'roughness_m'"]),
         ({"profile": {"kind": "log", "roughness_m": 8}}, ["twice roughness_m"]),
         ({"profile": {"kind": "power", "exponent": 3}}, ["profile.exponent", "at most 1"]),

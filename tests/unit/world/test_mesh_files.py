@@ -184,3 +184,8 @@ def test_errors_name_scenario_and_key(tmp_path, box_file):
 def test_a_size_that_suggests_another_unit_is_questioned(box_file, caplog, scale, question):
     mesh_solids(scenario_with(box_file("model.obj"), scale=scale))
     assert caplog.messages == ([] if question is None else [question])
+
+
+def test_a_path_of_windows_is_questioned():
+    with pytest.raises(DataFileError, match=r"no file 'sub\\gate.stl' .*; write / between folders"):
+        mesh_solids(scenario_with("sub\\gate.stl"))

@@ -13,7 +13,6 @@ from volery.autonomy.coverage.cells import Mask
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import PlanError
-from volery.core.vectors import norm
 
 BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked; unknown cells (-1) are blocked as well."""
@@ -42,8 +41,7 @@ class CoverageField:
         if not (info.resolution > 0.0 and math.isfinite(corner.x + corner.y + info.resolution)):
             raise PlanError("origin and resolution of a map must be finite, resolution above 0")
         turn = info.origin.orientation
-        q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
-        yaw = float(rotations.yaw_of(q)) if norm(q) > 0.5 else 0.0
+        yaw = rotations.heading_of((turn.x, turn.y, turn.z, turn.w)) or 0.0
         free = ((data >= 0) & (data < BLOCKED_FROM)).reshape(rows, columns)
         return cls(free, float(info.resolution), (float(corner.x), float(corner.y)), yaw)
 

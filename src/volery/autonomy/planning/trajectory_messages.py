@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.planning.primitives import PrimitivePath
+from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.graph.messages import (
@@ -88,7 +89,7 @@ def samples_of(message: MultiDOFJointTrajectory) -> TrajectorySamples | None:
     position = np.array([_vector(p.transforms[0].translation) for p in points])
     velocity = np.array([_vector(p.velocities[0].linear) for p in points])
     q = points[-1].transforms[0].rotation
-    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    yaw = rotations.heading_of((q.x, q.y, q.z, q.w)) or 0.0
     finite = np.isfinite(position).all() and np.isfinite(velocity).all() and math.isfinite(yaw)
     if not finite or (np.diff(times) <= 0).any():
         return None

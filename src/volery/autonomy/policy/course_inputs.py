@@ -152,8 +152,7 @@ def _gates_of(value: object) -> Array:
 
 def _gate_of(pose: Pose) -> list[float]:
     p, q = pose.position, pose.orientation
-    attitude = np.array([q.x, q.y, q.z, q.w])
-    return [p.x, p.y, p.z, float(rotations.yaw_of(attitude))]
+    return [p.x, p.y, p.z, rotations.heading_of((q.x, q.y, q.z, q.w)) or 0.0]
 
 
 def _are_possible(gates: Array) -> bool:

@@ -20,7 +20,7 @@ def with_present_times(
     """Returns plain values with `now_ns()` for a time `now` and a header `auto`, as in ROS 2.
 
     stamps_headers: headers without a stamp, or with an empty one, get one as well, as in rosbridge;
-    the message's own also if it is omitted.
+    the message's own also if it is omitted. Other times may be null or 0.
     """
     if stamps_headers and isinstance(plain, dict) and "header" not in plain:
         own = [member for member in _timed_members(msgtype) if member[0] == "header"]
@@ -31,11 +31,13 @@ def with_present_times(
 
 def _filled(plain: Any, msgtype: str, now_ns: Callable[[], int], stamps_headers: bool) -> Any:
     if msgtype == _TIME:
+        if stamps_headers and _is_no_time(plain):
+            return {}
         return _stamp(now_ns) if plain == "now" else plain
     if msgtype == _HEADER:
         if plain == "auto":
             return {"stamp": _stamp(now_ns)}
-        if stamps_headers and isinstance(plain, dict) and plain.get("stamp", {}) == {}:
+        if stamps_headers and isinstance(plain, dict) and _is_no_time(plain.get("stamp")):
             return {**plain, "stamp": _stamp(now_ns)}
     members = _timed_members(msgtype)
     if not members or not isinstance(plain, dict):
@@ -50,6 +52,11 @@ def _filled(plain: Any, msgtype: str, now_ns: Callable[[], int], stamps_headers:
         elif isinstance(value, list):
             filled[name] = [_filled(part, inner, now_ns, stamps_headers) for part in value]
     return filled
+
+
+def _is_no_time(plain: Any) -> bool:
+    """Returns whether a client gives no time: nothing, null as roslibpy, 0, or an empty object."""
+    return plain is None or plain == {} or (plain == 0 and not isinstance(plain, bool))
 
 
 def _stamp(now_ns: Callable[[], int]) -> dict[str, int]:

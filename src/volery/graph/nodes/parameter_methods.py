@@ -313,5 +313,5 @@ def _bounds(descriptor: Any) -> Within | None:
         return None
     for ranges in (descriptor.floating_point_range, descriptor.integer_range):
         if len(ranges):
-            return Within(ranges[0].from_value, ranges[0].to_value)
+            return Within(ranges[0].from_value, ranges[0].to_value, ranges[0].step)
     return None

@@ -417,6 +417,7 @@ def contents() -> dict[str, dict[str, Any]]:
         "rclpy.context": {"Context": Context},
         "rclpy.impl": {},
         "rclpy.impl.logging_severity": {"LoggingSeverity": logger.LoggingSeverity},
+        "rclpy.impl.rcutils_logger": {"RcutilsLogger": logger.NodeLogger},
         "rclpy.lifecycle": {
             "LifecycleNode": LifecycleNode,
             "Node": LifecycleNode,

@@ -12,7 +12,6 @@ from volery.control.flight_modes import FlightMode
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
-from volery.core.vectors import norm
 from volery.graph.graph import Graph
 from volery.graph.messages import (
     MultiDOFJointTrajectory,
@@ -102,8 +101,7 @@ def go_to_message(uav: Uav, message: Any) -> None:
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
     if not np.isfinite(q).all():
         raise CommandError("the rotation of a goal must be finite")
-    yaw = float(rotations.yaw_of(q)) if norm(q) > 0.5 else None
-    uav.go_to([place.x, place.y, place.z], yaw)
+    uav.go_to([place.x, place.y, place.z], rotations.heading_of(q))
 
 
 def stand_at_message(uav: Uav, message: Any) -> None:

@@ -68,6 +68,7 @@ def _vector(message: Any) -> list[float]:
 
 def _yaw(message: Any) -> float:
     q = np.array([message.x, message.y, message.z, message.w], dtype=np.float64)
-    if not 0.9 <= float(np.linalg.norm(q)) <= 1.1:
+    yaw = rotations.heading_of(q) if 0.9 <= float(np.linalg.norm(q)) <= 1.1 else None
+    if yaw is None:
         raise CommandError("rotations of a trajectory must be unit quaternions")
-    return float(rotations.yaw_of(q))
+    return yaw

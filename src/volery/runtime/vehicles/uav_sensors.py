@@ -15,9 +15,6 @@ from volery.sensors.sensor_samples import SensorSample
 _NAMED_ONLY = ("lidar", "camera")
 """Kinds without a usual name: which one is meant may change with the next that is added."""
 
-_OTHER_NAMES = {"gps": "gnss", "fix": "gnss", "baro": "barometer", "mag": "magnetometer"}
-"""Names by which others know kinds of sensors."""
-
 
 class UnknownSensorError(SensorError, KeyError):
     """A UAV has no sensor of this name."""
@@ -190,7 +187,7 @@ def find_sensor(uav: str, wanted: str, kinds: Mapping[str, str]) -> str:
         names = " or ".join(f"'{name}'" for name in found)
         advice = f"each {wanted} goes by its name, {names}"
         raise UnknownSensorError(f"{uav} has no sensor '{wanted}': {advice}. Known: {known}")
-    hint = near_miss(_OTHER_NAMES.get(str(wanted).lower(), wanted), [*kinds, *kinds.values()])
+    hint = near_miss(wanted, [*kinds, *kinds.values()])
     raise UnknownSensorError(f"{uav} has no sensor '{wanted}'{hint} Known: {known}")
 
 
