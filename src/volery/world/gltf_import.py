@@ -66,7 +66,7 @@ def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
         shown.append(part)
         corners = file.count(_position(primitive))
         triangles += _triangle_count(file, primitive) * len(transforms)
-        points += corners * (len(transforms) + np.count_nonzero(weights))
+        points += corners * (len(transforms) + int(np.count_nonzero(weights)))
         instances += len(transforms)
         if triangles > most_triangles or points > 3 * most_triangles:
             raise ValueError(
