@@ -85,7 +85,7 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
     points: list[tuple[float, float, float]] = []
     sizes: list[int] = []
     first = triangles = 0
-    is_open, key = False, b""
+    is_open, words = False, list[bytes]()
     for number, line in enumerate(data.splitlines(), 1):
         for words in filter(None, _statements(line)):
             key = words[0].lower()
@@ -105,10 +105,11 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
         raise ValueError("it is cut off within a facet: 'endloop' is missing")
     if is_open:
         raise ValueError("it is cut off within a facet: 'endfacet' is missing")
-    if key and b"facet".startswith(key):
-        raise ValueError(f"it is cut off: its last word is '{key.decode()}'")
     if not sizes:
         return []
+    last = words[-1].lower()
+    if b"facet".startswith(last) and words[0].lower() not in (b"solid", b"endsolid", b"end"):
+        raise ValueError(f"it is cut off: its last word is '{last.decode()}'")
     places = np.array(points, dtype=np.float64)
     if not np.isfinite(places).all():  # told with its vertex by the caller
         return [Part(places, np.array([[0, 1, 2]]), None)]

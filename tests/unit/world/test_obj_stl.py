@@ -213,7 +213,7 @@ def test_text_that_is_cut_off_is_no_half_mesh(read):
         if length in between or whole == len(ends):
             assert len(read(text[:length], "a.stl").triangles) == whole
         else:
-            with pytest.raises(DataFileError, match=r"cut off|line \d+: a (vertex|facet) "):
+            with pytest.raises(DataFileError, match=r"cut off|line \d+: a vertex|has no triangle"):
                 read(text[:length], "a.stl")
 
 
@@ -224,8 +224,12 @@ def test_a_half_box_names_what_is_missing(read):
         with pytest.raises(DataFileError, match="cut off within a facet: 'endfacet' is missing"):
             read(half, "a.stl")
     next_facet = text.index("facet normal", cut + 8)
-    with pytest.raises(DataFileError, match="cut off: its last word is 'fac'"):
-        read(text[: next_facet + 3], "a.stl")
+    for cut_off in (text[: next_facet + 3], " ".join(text[: next_facet + 3].split())):
+        with pytest.raises(DataFileError, match="cut off: its last word is 'fac'"):
+            read(cut_off, "a.stl")
+    assert len(read(text.replace("endsolid", "endsolid f"), "a.stl").triangles) == 12
+    with pytest.raises(DataFileError, match="has no triangle"):
+        read(SQUARE + "f 1 2 3 4\n", "a.stl")
 
 
 # ------------------------------------------------------------------------- far from the origin
