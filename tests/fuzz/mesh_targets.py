@@ -50,6 +50,17 @@ def _document():
     for buffer in document["buffers"]:
         code = base64.b64encode(parts[buffer["uri"]]).decode()
         buffer["uri"] = f"data:application/octet-stream;base64,{code}"
+    position = document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
+    for mesh in document["meshes"]:
+        mesh["weights"] = [0.5]
+        for primitive in mesh["primitives"]:
+            primitive["targets"] = [{"POSITION": position}]
+    for node in document["nodes"]:
+        attributes = {"TRANSLATION": position, "SCALE": position}
+        node["extensions"] = {
+            "EXT_mesh_gpu_instancing": {"attributes": attributes},
+            "KHR_node_visibility": {"visible": True},
+        }
     return document
 
 

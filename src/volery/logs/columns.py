@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.records import LogRecord
 from volery.core.errors import GraphError
 from volery.logs.fields import Column, Field, fields_of
 from volery.logs.sources import LogSource
@@ -47,7 +48,7 @@ def read_columns(
     for record in source.records(wanted.keys(), start_ns, end_ns):
         collector = collectors[record.topic.topic]
         try:
-            collector.add(record.time_ns, *decoder.decode(record))
+            collector.add(record, *decoder.decode(record))
         except GraphError as error:
             collector.refuse(str(error))
     return {topic: collector.columns() for topic, collector in collectors.items()}
@@ -66,15 +67,17 @@ class _Collector:
             for field, values in zip(self._fields, self._values, strict=True)
         ]
         self._times = array("q")
+        self._is_ros1 = False
         self._refused = 0
         self._problem = ""
 
-    def add(self, time_ns: int, msgtype: str, message: Any) -> None:
+    def add(self, record: LogRecord, msgtype: str, message: Any) -> None:
         """Adds a message; counts it if its type is another."""
         if msgtype != self._msgtype:
             self.refuse(f"its type is {msgtype}")
             return
-        self._times.append(time_ns)
+        self._times.append(record.time_ns)
+        self._is_ros1 = record.topic.encoding == "ros1"
         for read, append in self._reads:
             append(read(message))
 
@@ -86,7 +89,7 @@ class _Collector:
     def columns(self) -> Columns:
         """Returns what was collected."""
         pairs = zip(self._fields, self._values, strict=True)
-        found = {field.name: _column(field, values) for field, values in pairs}
+        found = {field.name: _column(field, values, self._is_ros1) for field, values in pairs}
         return Columns(np.array(self._times, np.int64), found, self._refused, self._problem)
 
 
@@ -94,13 +97,17 @@ def _empty(field: Field) -> Any:
     return [] if field.dtype is None else array(np.dtype(field.dtype).char.replace("?", "B"))
 
 
-def _column(field: Field, values: Any) -> Column:
+def _column(field: Field, values: Any, is_ros1: bool) -> Column:
     """Returns the values of a field in n messages as one array.
 
     Numbers: (n,). Arrays of equal lengths: (n, length). All else: (n,) of objects.
     """
+    is_octet = field.is_byte and not is_ros1
     if field.dtype is not None:
-        return np.array(values).astype(field.dtype, copy=False)
+        numbers = np.array(values).astype(field.dtype, copy=False)
+        return numbers.view(np.uint8) if is_octet else numbers
+    if is_octet:
+        values = [value.view(np.uint8) for value in values]
     if field.is_array and len({len(value) for value in values}) == 1:
         return np.stack(values)
     if field.length is not None:

@@ -25,8 +25,7 @@ from volery.graph.typestore import typestore
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _DTYPES: dict[str, type[Any]] = {
     "bool": np.bool_,
-    "byte": np.uint8,
-    "octet": np.uint8,
+    "byte": np.int8,
     "char": np.uint8,
     **{f"{s}int{b}": np.dtype(f"{s}int{b}").type for s in ("u", "") for b in (8, 16, 32, 64)},
     "float32": np.float32,
@@ -41,11 +40,13 @@ class Field:
     name: str
     """Name with dots, such as `pose.pose.position.x`."""
     dtype: type[Any] | None
-    """Type of a number; None for texts, lists of messages and arrays."""
+    """Type of a number in messages; None for texts, lists of messages and arrays."""
     is_array: bool
     """Whether it is an array of numbers."""
     length: int | None = None
     """Length of a fixed array."""
+    is_byte: bool = False
+    """Whether the numbers are of type `byte`: signed in ROS 1 (int8), unsigned in ROS 2 (octet)."""
 
 
 Column = NDArray[Any]
@@ -66,11 +67,13 @@ def _fields(msgtype: str, prefix: str) -> Iterator[Field]:
         if kind == Nodetype.NAME:
             yield from _fields(detail, f"{name}.")
         elif kind == Nodetype.BASE:
-            yield Field(name, _DTYPES.get(detail[0]), is_array=False)
+            base = detail[0]
+            yield Field(name, _DTYPES.get(base), is_array=False, is_byte=base == "byte")
         else:
             fixed = kind == Nodetype.ARRAY
             numbers = is_number_array(described)
-            yield Field(name, None, numbers, detail[1] if fixed and numbers else None)
+            length = detail[1] if fixed and numbers else None
+            yield Field(name, None, numbers, length, numbers and detail[0][1][0] == "byte")
 
 
 def messages_in(msgtype: str) -> dict[str, str]:

@@ -37,8 +37,8 @@ def open_log(path: str | Path) -> Log:
     """Opens a log as data: MCAP, a ROS 1 bag, a ROS 2 bag (folder or .db3 file), or PX4's ULog.
 
     Truncated and damaged files are read as far as possible: a `LogWarning` and `Log.problem`
-    describe the damage. Raises `RecordingError` if the file is missing, no log, or exceeds the
-    limits of logs.
+    describe the damage. Raises `RecordingError` if the file is missing, no log, a folder of several
+    logs that are no parts of one bag, or exceeds the limits of logs.
     """
     path = Path(path)
     log = Log(path, open_source(path), WHOLE_NS)

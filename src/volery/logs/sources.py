@@ -107,8 +107,11 @@ def log_kind(path: Path) -> str:
     if path.is_dir():
         return "ros2bag"
     by_suffix = {".ulg": "ulog", ".db3": "ros2bag"}.get(path.suffix.lower(), "")
-    kind = {"sqlite": "ros2bag", "zstd": "ros2bag"}.get(found := file_signature(path), found)
-    return kind or by_suffix or log_format(path)
+    found = file_signature(path)
+    kind = {"sqlite": "ros2bag", "zstd": "ros2bag", "ulog": "ulog"}.get(found)
+    if kind is None and not found:
+        kind = by_suffix
+    return kind or log_format(path, "a ROS 2 bag", "a ULog of PX4")
 
 
 def _close(parts: list[ChunkedLog], files: BagFiles | None = None) -> None:

@@ -16,6 +16,8 @@ HEAD = struct.Struct("<HB")
 """Head of a message: length of the payload, kind."""
 KINDS = frozenset(b"ABCDFILMOPQRS")
 """Kinds of messages that the format defines."""
+_LETTERS = frozenset(range(0x21, 0x7F))
+"""Printable characters, of which a kind is one."""
 SYNC = HEAD.pack(8, ord("S")) + bytes.fromhex("2f731320250cbb12")
 """A whole synchronization message."""
 
@@ -75,15 +77,31 @@ class UlogRecovery:
         return end
 
 
-def is_unknown_kind(file: BinaryIO, kind: int, position: int, size: int) -> bool:
-    """Returns whether a message of an undefined kind is whole: a defined one follows it.
+def after_unknown_kinds(file: BinaryIO, begin: int, end: int) -> int | None:
+    """Returns the position after whole messages of undefined kinds; None if they are damage.
 
-    Readers skip kinds that later versions of the format define. position: end of the message.
+    Readers skip kinds that later versions of the format define. Such messages have a printable
+    letter, and lead to a defined message that leads to another, or to `end`; a synchronization
+    message within one shows that its length is damaged.
     """
-    if kind == 0 or position >= size:
-        return kind != 0 and position == size
-    head = _bytes(file, position, position + HEAD.size)
-    return len(head) == HEAD.size and head[2] in KINDS
+    position = begin
+    while (head := _head(file, position, end)) is not None:
+        length, kind = head
+        if kind in KINDS:
+            after = _head(file, position + HEAD.size + length, end)
+            return None if after is not None and after[1] not in _LETTERS else position
+        if kind not in _LETTERS or SYNC in file.read(length):
+            return None
+        position += HEAD.size + length
+    return position if position <= end else None
+
+
+def _head(file: BinaryIO, position: int, end: int) -> tuple[int, int] | None:
+    """Returns length and kind of the message at a position; None if it has no whole head."""
+    if position + HEAD.size > end:
+        return None
+    length, kind = HEAD.unpack(_bytes(file, position, position + HEAD.size))
+    return length, kind
 
 
 def _first_message(data: bytes, chain: int | None, *, is_end: bool) -> int:

@@ -13,7 +13,7 @@ from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import RecordingError
 from volery.logs.topic_count import TopicCount
 from volery.logs.ulog_format import TEXTS, US_NS, UlogTopic, text_cdr
-from volery.logs.ulog_recovery import HEAD, KINDS, UlogRecovery, is_unknown_kind
+from volery.logs.ulog_recovery import HEAD, KINDS, UlogRecovery, after_unknown_kinds
 
 MAGIC = b"ULog\x01\x12\x35"
 _HEADER_BYTES = 16
@@ -138,8 +138,8 @@ class UlogSource:
                     position = ends.pop(0)  # a message is cut off where data were appended
                 continue
             if kind not in KINDS:
-                if not is_unknown_kind(file, kind, position, ends[0]):
-                    position = recovery.resume(file, begin, ends[0])
+                after = after_unknown_kinds(file, begin, ends[0])
+                position = recovery.resume(file, begin, ends[0]) if after is None else after
                 continue
             payload = file.read(length)
             if kind == ord("B") and length >= _FLAGS.size:

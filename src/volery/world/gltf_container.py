@@ -10,6 +10,7 @@ import base64
 import binascii
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -17,12 +18,14 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.plurals import counted
 
 _HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
+_MAGIC = b"glTF"
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC3": 3}
+_WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 """Components of an element; meshes without textures need no others."""
 
 
@@ -51,6 +54,19 @@ def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
     return found
 
 
+def numbers(holder: dict[str, Any], key: str, count: int | None, default: Sequence[float]) -> Array:
+    """Returns a list of numbers of a JSON object; count: their number, None for any.
+
+    Raises `ValueError` if one is not a number below 1e30, or their number is another.
+    """
+    values = field(holder, key, list, list(default))
+    if count not in (None, len(values)) or not all(
+        isinstance(value, int | float) and abs(value) < 1e30 for value in values
+    ):
+        raise ValueError(f"'{key}' needs {'' if count is None else f'{count} '}finite numbers")
+    return np.array(values, dtype=np.float64)
+
+
 _NAMES = {int: "an integer", list: "a list", dict: "an object", str: "text"}
 
 
@@ -62,9 +78,13 @@ class Container:
         self._bytes_left = most_bytes
         self._buffers: dict[int, bytes] = {}
         data = path.read_bytes()
-        if path.suffix.lower() == ".glb":
+        if data.startswith(_MAGIC):
             data = self._unpack(data)
-        document = json.loads(data.decode("utf-8-sig"))
+        try:
+            document = json.loads(data)
+        except ValueError as error:
+            reason = error if isinstance(error, json.JSONDecodeError) else "no text"
+            raise ValueError(f"it is neither binary glTF nor JSON ({reason})") from None
         if not isinstance(document, dict):
             raise ValueError("its JSON is not an object")
         version = field(field(document, "asset", dict), "version", str)
@@ -78,6 +98,11 @@ class Container:
         if count < 0:
             raise ValueError(f"accessor {number} has {count} elements")
         return count
+
+    def is_zero(self, number: Any) -> bool:
+        """Returns whether accessor `number` has no data: all its elements are zero."""
+        accessor = entry(self.document, "accessors", number)
+        return not {"bufferView", "sparse"} & accessor.keys()
 
     def array(self, number: Any, form: str) -> NDArray[Any]:
         """Returns the elements (count, width) of accessor `number`, which has the type `form`."""
@@ -105,9 +130,9 @@ class Container:
         """Returns the JSON of a GLB; its binary chunk becomes buffer 0."""
         if len(data) < _HEAD.size:
             raise ValueError("it ends within its head")
-        magic, version, _ = _HEAD.unpack_from(data)
-        if magic != b"glTF" or version != 2:
-            raise ValueError(f"it begins with {magic!r} and version {version}, not b'glTF' and 2")
+        _, version, _ = _HEAD.unpack_from(data)
+        if version != 2:
+            raise ValueError(f"it is binary glTF of version {version}; version 2 is read")
         at = _HEAD.size
         chunks: list[tuple[int, bytes]] = []
         while at + _CHUNK.size <= len(data) and len(chunks) < 2:

@@ -1,28 +1,41 @@
 """Reads the triangles of a glTF 2.0 scene, with the base colours of its materials.
 
-Triangles, strips and fans are read; points, lines, textures, skins and animations are ignored.
-Sizes and links are checked before memory is allocated. Khronos Group, glTF 2.0 Specification,
-sections 3.5 (scenes), 3.7 (meshes) and 3.12 (extensions).
+Triangles, strips and fans are read, with morph targets at their default weights; points, lines,
+textures, skins and animations are ignored. Sizes and links are checked before memory is allocated.
+Khronos Group, glTF 2.0 Specification, sections 3.7 (meshes) and 3.12 (extensions).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.core import rotations
 from volery.core.arrays import Array
-from volery.world.gltf_container import Container, entry, field
+from volery.world.gltf_container import Container, entry, field, numbers
+from volery.world.gltf_nodes import (
+    MOST_INSTANCES,
+    READ_EXTENSIONS,
+    ShownPrimitive,
+    shown_primitives,
+)
 
 MOST_PARTS = 100_000
 """Maximum number of meshes in nodes, each counted as often as used."""
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quant")
-"""Prefixes of required extensions that do not affect the triangles."""
+_HARMLESS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_",
+    "KHR_mesh_quant",
+    "KHR_animation_pointer",
+    "KHR_node_selectability",
+    "KHR_node_hoverability",
+)
+"""Prefixes of required extensions that do not affect the triangles at rest."""
 
 
 class Part(NamedTuple):
@@ -37,96 +50,33 @@ class Part(NamedTuple):
     colour: Array | None
 
 
-class _Shown(NamedTuple):
-    """A primitive of a mesh in a node; transform: (4, 4) scene from mesh."""
-
-    primitive: dict[str, Any]
-    transform: Array
-
-
 def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
     """Returns all parts of the file's scene; raises `ValueError` without the file's name."""
     file = Container(path, most_bytes)
     required = field(file.document, "extensionsRequired", list, [])
     for name in required:
-        if not str(name).startswith(_HARMLESS):
+        if not str(name).startswith(_HARMLESS) and name not in READ_EXTENSIONS:
             raise ValueError(f"it needs the extension {str(name)[:60]}, which is not read")
-    shown: list[_Shown] = []
-    triangles = points = 0
-    for part in _shown(file.document):
+    shown: list[ShownPrimitive] = []
+    triangles = points = instances = 0
+    for part in shown_primitives(file):
+        primitive, transforms, weights = part
+        if _mode(primitive) not in (_TRIANGLES, _STRIP, _FAN):
+            continue
         shown.append(part)
-        triangles += _triangle_count(file, part.primitive)
-        points += file.count(_position(part.primitive))
+        corners = file.count(_position(primitive))
+        triangles += _triangle_count(file, primitive) * len(transforms)
+        points += corners * (len(transforms) + int(np.count_nonzero(weights)))
+        instances += len(transforms)
         if triangles > most_triangles or points > 3 * most_triangles:
             raise ValueError(
                 f"its nodes show more than {most_triangles:,} triangles, or corners of so many"
             )
-        if len(shown) > MOST_PARTS:
-            raise ValueError(f"its nodes show more than {MOST_PARTS:,} parts")
+        if len(shown) > MOST_PARTS or instances > MOST_INSTANCES:
+            raise ValueError(
+                f"its nodes show more than {MOST_PARTS:,} parts, or {MOST_INSTANCES:,} instances"
+            )
     return [_part(file, each) for each in shown]
-
-
-# ---------------------------------------------------------------------------------------- the nodes
-
-
-def _shown(document: dict[str, Any]) -> Iterator[_Shown]:
-    """Yields primitives made of triangles in the order of the tree of nodes."""
-    seen: set[int] = set()
-    todo = [(number, np.eye(4)) for number in reversed(_roots(document))]
-    while todo:
-        number, above = todo.pop()
-        node = entry(document, "nodes", number)
-        if number in seen:
-            raise ValueError(f"node {number} is reached twice: nodes must form a tree")
-        seen.add(number)
-        transform = above @ _transform(node)
-        if "mesh" in node:
-            mesh = entry(document, "meshes", node["mesh"])
-            for k in range(len(field(mesh, "primitives", list))):
-                primitive = entry(mesh, "primitives", k)
-                if _mode(primitive) in (_TRIANGLES, _STRIP, _FAN):
-                    yield _Shown(primitive, transform)
-        children = field(node, "children", list, [])
-        todo += [(child, transform) for child in reversed(children)]
-
-
-def _roots(document: dict[str, Any]) -> Sequence[Any]:
-    """Returns the root nodes of the scene: of the named one, else the first, else all roots."""
-    if field(document, "scenes", list, []):
-        scene = entry(document, "scenes", document.get("scene", 0))
-        return list(field(scene, "nodes", list, []))
-    nodes = field(document, "nodes", list, [])
-    below = {
-        child
-        for number in range(len(nodes))
-        for child in field(entry(document, "nodes", number), "children", list, [])
-        if isinstance(child, int)
-    }
-    return [number for number in range(len(nodes)) if number not in below]
-
-
-def _transform(node: dict[str, Any]) -> Array:
-    """Returns the transform (4, 4), parent from node."""
-    if "matrix" in node:
-        return _numbers(node, "matrix", 16, ()).reshape(4, 4).T
-    turn = _numbers(node, "rotation", 4, (0.0, 0.0, 0.0, 1.0))
-    if not turn.any():
-        raise ValueError("a node's 'rotation' is zero")
-    transform = np.eye(4)
-    transform[:3, :3] = rotations.matrix(rotations.normalize(turn)) * _numbers(
-        node, "scale", 3, (1.0, 1.0, 1.0)
-    )
-    transform[:3, 3] = _numbers(node, "translation", 3, (0.0, 0.0, 0.0))
-    return transform
-
-
-def _numbers(holder: dict[str, Any], key: str, count: int, default: Sequence[float]) -> Array:
-    values = field(holder, key, list, list(default))
-    if len(values) != count or not all(
-        isinstance(value, int | float) and abs(value) < 1e30 for value in values
-    ):
-        raise ValueError(f"'{key}' needs {count} finite numbers")
-    return np.array(values, dtype=np.float64)
 
 
 # ----------------------------------------------------------------------------------- the primitives
@@ -151,9 +101,10 @@ def _triangle_count(file: Container, primitive: dict[str, Any]) -> int:
     return corners // 3 if _mode(primitive) == _TRIANGLES else max(corners - 2, 0)
 
 
-def _part(file: Container, shown: _Shown) -> Part:
-    primitive, transform = shown
-    points = file.array(_position(primitive), "VEC3").astype(np.float64)
+def _part(file: Container, shown: ShownPrimitive) -> Part:
+    """Returns a primitive in the scene, as often as its node has instances."""
+    primitive, transforms, weights = shown
+    points = _points(file, primitive, weights)
     if "indices" in primitive:
         corners = file.array(primitive["indices"], "SCALAR")[:, 0]
         if corners.dtype.kind != "u":
@@ -161,12 +112,32 @@ def _part(file: Container, shown: _Shown) -> Part:
         corners = corners.astype(np.int64)
     else:
         corners = np.arange(len(points))
+    if len(corners) and corners.max() >= len(points):
+        raise ValueError(f"a triangle has vertex {corners.max()}; there are {len(points)}")
     triangles = _triangles(corners, _mode(primitive))
-    if np.linalg.det(transform[:3, :3]) < 0.0:
-        triangles = triangles[:, ::-1]
-    return Part(
-        points @ transform[:3, :3].T + transform[:3, 3], triangles, _colour(file, primitive)
-    )
+    linear = transforms[:, :3, :3]
+    placed = points @ linear.transpose(0, 2, 1) + transforms[:, None, :3, 3]
+    mirrored = np.linalg.det(linear) < 0.0
+    turned = np.where(mirrored[:, None, None], triangles[:, ::-1], triangles)
+    turned += (np.arange(len(transforms)) * len(points))[:, None, None]
+    return Part(placed.reshape(-1, 3), turned.reshape(-1, 3), _colour(file, primitive))
+
+
+def _points(file: Container, primitive: dict[str, Any], weights: Array) -> Array:
+    """Returns the corners (V, 3) of a primitive, moved by its morph targets."""
+    points = file.array(_position(primitive), "VEC3").astype(np.float64)
+    targets = field(primitive, "targets", list, [])
+    if targets and len(weights) not in (0, len(targets)):
+        raise ValueError(f"a mesh has {len(weights)} weights for {len(targets)} morph targets")
+    for k in np.flatnonzero(weights[: len(targets)]).tolist():
+        target = entry(primitive, "targets", k)
+        if "POSITION" not in target or file.is_zero(target["POSITION"]):
+            continue
+        number = field(target, "POSITION", int)
+        if file.count(number) != len(points):
+            raise ValueError(f"a morph target has {file.count(number)} corners, not {len(points)}")
+        points += weights[k] * file.array(number, "VEC3")
+    return points
 
 
 def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
@@ -192,4 +163,4 @@ def _colour(file: Container, primitive: dict[str, Any]) -> Array | None:
     surface = field(material, "pbrMetallicRoughness", dict, {})
     if "baseColorFactor" not in surface:
         return None
-    return _numbers(surface, "baseColorFactor", 4, ())[:3]
+    return numbers(surface, "baseColorFactor", 4, ())[:3]

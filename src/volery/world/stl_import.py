@@ -1,9 +1,9 @@
 """Reads the triangles of STL files, binary and text.
 
 A binary file has a header of 80 bytes, the number of its triangles and 50 bytes for each (M. Burns,
-Automated Fabrication, 1993, section 6.5). Programs add bytes after them, leave the number 0, or
-append one file to another: what is there is read, what is missing is an error. Normals and colours
-are ignored.
+Automated Fabrication, 1993, section 6.5). Programs add bytes after them, leave a number that stands
+for an unknown one, or append one file to another: what is there is read, what is missing is an
+error. Normals and colours are ignored.
 """
 
 from __future__ import annotations
@@ -16,9 +16,14 @@ from volery.world.gltf_import import Part
 from volery.world.polygons import triangulated
 
 _HEAD = 84
+_UNKNOWN_COUNTS = (0, 0x7FFFFFFF, 0xFFFFFFFF)
+"""Numbers of triangles of programs that write the header first and do not return to it.
+
+Any other number that is larger than the file is that of a file that is cut off.
+"""
 _MOST_WORDS = 5
 _ENDS = (b"endloop", b"end", b"endfacet", b"facet", b"endsolid")
-"""Statements that end a facet; some programs write `end loop`, or leave one out."""
+"""Statements that end a loop; some programs write `end loop`, or leave one out."""
 _STATEMENT = re.compile(
     rb"\b(?:facet|outer|vertex|end\s*loop|end\s*facet|endsolid)\b", re.IGNORECASE
 )
@@ -47,8 +52,9 @@ def _binary(data: bytes, most_triangles: int) -> np.ndarray | None:
     while len(data) - begin >= _HEAD:
         count = int.from_bytes(data[begin + _HEAD - 4 : begin + _HEAD], "little")
         room, rest = divmod(len(data) - begin - _HEAD, _TRIANGLE.itemsize)
-        if count == 0 and begin == 0 and rest == 0 and b"\0" in data[_HEAD:]:
-            count = room  # written by a program that did not know the number at the beginning
+        is_unknown = count in _UNKNOWN_COUNTS and begin == 0 and rest == 0
+        if is_unknown and b"\0" in data[_HEAD:]:
+            count = room
         if not 0 < count <= room:
             break
         total += count
@@ -64,8 +70,10 @@ def _not_whole(data: bytes) -> str:
     if len(data) < _HEAD:
         return f"it is no text, and {len(data)} bytes are too few for a binary STL"
     count = int.from_bytes(data[_HEAD - 4 : _HEAD], "little")
-    if not count:
-        return "it is a binary STL without a triangle"
+    if count in _UNKNOWN_COUNTS:
+        if len(data) - _HEAD < _TRIANGLE.itemsize:
+            return "it is a binary STL without a triangle"
+        return "it is cut off: its triangles of 50 bytes each are not whole"
     need = _HEAD + count * _TRIANGLE.itemsize
     return (
         f"it is no text, and as a binary STL its header announces {count:,} triangles, "
@@ -77,9 +85,11 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
     points: list[tuple[float, float, float]] = []
     sizes: list[int] = []
     first = triangles = 0
+    is_open, words = False, list[bytes]()
     for number, line in enumerate(data.splitlines(), 1):
-        for words in _statements(line):
-            key = words[0].lower() if words else b""
+        for words in filter(None, _statements(line)):
+            key = words[0].lower()
+            is_open = key == b"facet" or (is_open and not _is_end_of_facet(key, words))
             if key == b"vertex":
                 points.append(_vertex(number, words))
             elif key in _ENDS and len(points) > first:
@@ -92,9 +102,14 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
                 if triangles > most_triangles:
                     raise ValueError(f"it has more than {most_triangles:,} triangles")
     if first < len(points):
-        raise ValueError("it ends within a facet: 'endloop' is missing")
+        raise ValueError("it is cut off within a facet: 'endloop' is missing")
+    if is_open:
+        raise ValueError("it is cut off within a facet: 'endfacet' is missing")
     if not sizes:
         return []
+    last = words[-1].lower()
+    if b"facet".startswith(last) and words[0].lower() not in (b"solid", b"endsolid", b"end"):
+        raise ValueError(f"it is cut off: its last word is '{last.decode()}'")
     places = np.array(points, dtype=np.float64)
     if not np.isfinite(places).all():  # told with its vertex by the caller
         return [Part(places, np.array([[0, 1, 2]]), None)]
@@ -112,6 +127,12 @@ def _statements(line: bytes) -> list[list[bytes]]:
         return [words]  # words of a name
     begins = [0, *begins]
     return [line[a:b].split() for a, b in zip(begins, [*begins[1:], len(line)], strict=True)]
+
+
+def _is_end_of_facet(key: bytes, words: list[bytes]) -> bool:
+    if key == b"end":
+        return b"".join(words[1:2]).lower() in (b"facet", b"solid")
+    return key in (b"endfacet", b"endsolid")
 
 
 def _vertex(number: int, words: list[bytes]) -> tuple[float, float, float]:

@@ -365,9 +365,13 @@ def test_errors_name_what_is_there(mcap):
 def test_a_missing_file_and_no_log(tmp_path):
     with pytest.raises(RecordingError, match="cannot read the log: No such file"):
         open_log(tmp_path / "none.mcap")
-    (tmp_path / "text.mcap").write_text("no log at all")
-    with pytest.raises(RecordingError, match="neither an MCAP log nor a ROS 1 bag"):
-        open_log(tmp_path / "text.mcap")
+    all_formats = (
+        r"neither an MCAP log, a ROS 1 bag \(version 2\.0\), a ROS 2 bag nor a ULog of PX4$"
+    )
+    for name in ("text.mcap", "field.toml"):
+        (tmp_path / name).write_text("no log at all")
+        with pytest.raises(RecordingError, match=all_formats):
+            open_log(tmp_path / name)
     (tmp_path / "empty").mkdir()
     with pytest.raises(RecordingError, match=r"the folder holds no \.mcap and no \.db3"):
         open_log(tmp_path / "empty")

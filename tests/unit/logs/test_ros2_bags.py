@@ -47,13 +47,92 @@ def test_a_folder_without_metadata(bag):
     assert sum(record.topic.topic == "/note" for record in BagWalk(bag)) == COUNT
 
 
-def test_several_files_without_metadata(bag):
-    shutil.copy(_file(bag), bag / "bag_10.db3")
-    (bag / "bag_2.db3").write_bytes(b"")  # the last file may be empty
-    with pytest.warns(LogWarning, match=r"bag_2\.db3: the file is empty"):
+SCHEMES = [
+    ("bag", "bag_{}.db3"),
+    ("bag_2026_01_31-09_30_00", "{}_bag_2026_01_31-09_3{}_00.db3"),
+    ("rosbag2_2026_01_31-09_30_00", "rosbag2_2026_01_31-09_30_00_{}.db3"),
+]
+"""Folders and files of rosbag2's versions."""
+
+
+@pytest.mark.parametrize(("folder", "name"), SCHEMES)
+def test_several_files_without_metadata(tmp_path, folder, name):
+    bag = write_sqlite_bag(tmp_path / folder)
+    (bag / "metadata.yaml").unlink()
+    first = _file(bag).rename(bag / name.format(0, 0))
+    shutil.copy(first, bag / name.format(10, 2))
+    (bag / name.format(2, 1)).write_bytes(b"")  # the last file may be empty
+    (bag / f"._{first.name}").write_bytes(b"\0\5\x16\7")  # of macOS
+    with pytest.warns(LogWarning, match=rf"{name.format(2, 1)}: the file is empty"):
         log = open_log(bag)
+    assert "._" not in log.problem
     assert log.topics["/note"].messages == 2 * COUNT
     assert log["/note"]["data"].tolist() == 2 * [f"note {k}" for k in range(COUNT)]
+
+
+INDEPENDENT = [
+    ("flight1.mcap", "flight2.mcap"),
+    ("flight_2026_01_01.mcap", "flight_2026_01_02.mcap"),
+    ("flight_2026_01_01-10_00_10.mcap", "flight_2026_01_01-10_00_20.mcap"),
+    ("north_0.mcap", "south_0.mcap"),
+    ("north_0.mcap", "south_1.mcap"),
+    ("bag.mcap", "bag_1.mcap"),
+    ("bag_0.mcap", "bag_0.mcap.zst"),  # packed and unpacked
+    ("bag_0.mcap", "bag_0.db3"),  # converted
+]
+
+
+@pytest.mark.parametrize("metadata", ["", "a: [", "{relative_file_paths: [gone.mcap]}"])
+@pytest.mark.parametrize("names", INDEPENDENT)
+def test_logs_that_are_no_parts_of_one_bag_are_not_joined(tmp_path, names, metadata):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    if metadata:
+        (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {metadata}\n")
+    for name in names:
+        write_log(folder / "log.mcap").rename(folder / name)
+    with pytest.raises(RecordingError) as caught:
+        open_log(folder)
+    assert str(caught.value).endswith(f": {', '.join(sorted(names, key=len))}; name one of them")
+    assert "not those of one bag (bag_0, bag_1)" in str(caught.value)
+    for command in ("info", "play"):
+        result = runner.invoke(app, [command, str(folder)])
+        assert result.exit_code == 2
+        assert "name one of them" in result.stderr
+        assert result.stderr.count("\n") == 1
+    with open_log(folder / "bag_0.mcap" if "bag_0.mcap" in names else folder / names[1]) as log:
+        assert log.topics["/note"].messages == COUNT
+    for name in names[1:]:
+        (folder / name).unlink()
+    if not metadata:
+        with open_log(folder) as log:  # one log is read, whatever its name
+            assert (log.problem, log.topics["/note"].messages) == ("", COUNT)
+
+
+def test_numbered_logs_of_another_folder_are_joined_with_a_note(tmp_path):
+    folder = tmp_path / "renamed"
+    folder.mkdir()
+    for k in (1, 2):
+        write_log(folder / f"flight_{k}.mcap")
+    with pytest.warns(LogWarning, match="missing; read as one bag: flight_1.mcap, flight_2.mcap"):
+        log = open_log(folder)
+    assert log.topics["/note"].messages == 2 * COUNT
+
+
+@pytest.mark.filterwarnings("ignore::volery.core.errors.LogWarning")
+def test_files_that_metadata_names_are_no_mixture(tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for name in ("north.mcap", "south.mcap", "left_over.mcap"):
+        write_log(folder / name)
+    text = "rosbag2_bagfile_information:\n  relative_file_paths: [{}]\n"
+    (folder / "metadata.yaml").write_text(text.format("south.mcap, north.mcap"))
+    with open_log(folder) as log:
+        assert (log.problem, log.topics["/note"].messages) == ("", 2 * COUNT)
+    (folder / "metadata.yaml").write_text(text.format("south.mcap, lost.mcap"))
+    with open_log(folder) as log:
+        assert log.problem.endswith("missing: lost.mcap; read without it: south.mcap")
+        assert log.topics["/note"].messages == COUNT
 
 
 @pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
@@ -206,6 +285,7 @@ def test_damage_within_a_message_ends_the_reading_there(tmp_path):
         (b"\x1f\x8b\x08\0" + bytes(20), "it is compressed by gzip: `gunzip` unpacks it"),
         (b"PK\x03\x04" + bytes(20), "it is compressed by zip: `unzip`"),
         (b"#ROSBAG V1.2\n" + bytes(20), "a bag of an older version: `rosbag filter"),
+        (b"ULogEnc\x01" + bytes(20), "it is an encrypted log of PX4"),
         (b"\xa3\x95\x80\x80" + bytes(20), "a dataflash log of ArduPilot"),
         (b"\x28\xb5\x2f\xfd" + bytes(20), "nothing can be unpacked"),
         (
@@ -221,6 +301,23 @@ def test_what_is_no_log_is_named_with_its_remedy(tmp_path, content, words):
         open_log(path)
     assert words in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "formats"),
+    [
+        (["info"], "a ROS 1 bag (version 2.0), a ROS 2 bag nor a ULog of PX4"),
+        (["play"], "a ROS 1 bag (version 2.0) nor a ROS 2 bag"),
+        (["slam"], "a ROS 1 bag (version 2.0) nor a ROS 2 bag; a scanner's text log needs"),
+        (["recover"], "an MCAP log nor a ROS 1 bag (version 2.0)"),
+    ],
+)
+def test_each_command_names_the_formats_that_it_reads(tmp_path, arguments, formats):
+    path = tmp_path / "field.toml"
+    path.write_text('name = "field"\n')
+    result = runner.invoke(app, [*arguments, str(path)])
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert formats in result.stderr
 
 
 def test_messages_that_sqlite_has_not_moved_are_named(bag):

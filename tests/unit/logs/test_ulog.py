@@ -150,11 +150,46 @@ def test_two_damaged_places_and_lost_bytes(path, whole):
     assert [counts(log, name) for name in ("/esc_status", "/odd", "/odd_1")] == [50, 49, 50]
 
 
-def test_messages_of_later_versions_are_skipped(path, whole):
-    middle = whole.index(samples()[60])
-    path.write_bytes(whole[:middle] + message("Z", b"news") + whole[middle:])
+NEWS = [message("Z", b"news"), message("z", b"\1"), message("#", bytes(300)), message("Z", b"\0")]
+EMPTY = message("Z", b"")
+
+
+@pytest.mark.parametrize("is_synced", [False, True])
+@pytest.mark.parametrize("news", [NEWS[:1], NEWS, NEWS * 400, [EMPTY, *NEWS]])
+def test_messages_of_later_versions_are_skipped(path, whole, news, is_synced):
+    """One, several in a row, before the first sample, between samples, and at the end."""
+    first, middle = whole.index(samples()[0]), whole.index(samples()[60])
+    added = b"".join([SYNC * is_synced, *news])
+    path.write_bytes(added.join([whole[:first], whole[first:middle], whole[middle:], b""]))
     log = open_log(path)
-    assert (log.problem, counts(log)) == ("", 50)
+    assert log.problem == ""
+    assert [counts(log, name) for name in ("/esc_status", "/odd", "/odd_1")] == [50, 50, 50]
+    if EMPTY not in news:  # pyulog takes an empty one for damage
+        theirs = {(data.name, data.multi_id): data.data for data in ULog(str(path)).data_list}
+        assert np.array_equal(log["/odd"]["x"], theirs["odd", 0]["x"])
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"\x04\0Z",  # a length that leads into the next message
+        b"\xff\x01Zgarbage",  # over messages for synchronization
+        message("Z", b"news") + b"\x02\0\x07",
+        message("Z", b"news") + bytes(40),
+        b"The quick brown fox jumps over the lazy dog",
+        np.random.default_rng(5).bytes(3000),
+    ],
+)
+def test_garbage_is_no_message_of_a_later_version(path, whole, garbage):
+    parts = [part for sample in samples() for part in (sample, SYNC)]
+    start = whole[: whole.index(samples()[0])]
+    before = start + b"".join(parts[:60])
+    path.write_bytes(before + garbage + b"".join(parts[60:]))
+    with pytest.warns(LogWarning, match=r"px4\.ulg: "):
+        log = open_log(path)
+    assert log.problem.startswith("damaged at byte ")
+    assert counts(log) == 50
+    assert log["/odd"]["step"].tolist() == [-k for k in range(50)]
 
 
 @pytest.mark.parametrize("cut", [0, 5])

@@ -1,9 +1,11 @@
 """OBJ and STL as programs write them: every index, face, ending and byte order mark."""
 
+import re
 import struct
 
 import numpy as np
 import pytest
+import trimesh
 
 from volery.core.errors import DataFileError, ScenarioError
 from volery.runtime.build.user_meshes import mesh_solids
@@ -122,6 +124,8 @@ def binary(facets, count=None, head=b"probe"):
         (binary(TWO) + bytes(300), 2),  # a block of an exporter
         (binary(ONE) + binary(TWO), 3),  # one file after another
         (binary(TWO, count=0), 2),  # written without going back to the header
+        (binary(TWO, count=0xFFFFFFFF), 2),
+        (binary(TWO, count=0x7FFFFFFF), 2),
         (binary(TWO, head=b"solid made by CAD"), 2),
         (binary(TWO, head=b"COLOR=\xff\x80\x00\xff,MATERIAL="), 2),
     ],
@@ -137,6 +141,9 @@ def test_binary_files_as_programs_write_them(read, content, triangles):
     [
         (binary(TWO)[:-1], r"announces 2 triangles, 184 bytes; it has 183"),
         (binary(ONE, count=7), r"announces 7 triangles, 434 bytes; it has 134"),
+        (binary(ONE, count=0xFFFFFFFE), r"announces 4,294,967,294 triangles"),
+        (binary(TWO, count=0xFFFFFFFF)[:-1], "it is cut off: its triangles of 50 bytes each"),
+        (binary(TWO, count=0)[:-1], "it is cut off: its triangles of 50 bytes each"),
         (binary(b""), "without a triangle"),
         (bytes(20), "20 bytes are too few"),
         ("solid a\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "'endloop' is missing"),
@@ -185,6 +192,44 @@ def test_text_in_the_spellings_of_programs(read, text, name):
     for mark in (b"", b"\xef\xbb\xbf"):
         file = read(mark + f"solid {name}\n{text}".encode(), "a.stl")
         assert (len(file.triangles), file.mesh.area) == (3, pytest.approx(6.0))
+
+
+def box_text():
+    box = trimesh.creation.box((2.0, 2.0, 2.0))
+    text = box.export(file_type="stl_ascii")
+    return text if text.endswith("\n") else text + "\n"
+
+
+def test_text_that_is_cut_off_is_no_half_mesh(read):
+    """Cut at every byte: all its triangles, none (a cut in the name), or one error.
+
+    A cut between two facets leaves a whole file without `endsolid`, which some programs leave out.
+    """
+    text = box_text()
+    ends = [found.end() for found in re.finditer("endfacet", text)]
+    between = {k for end in ends for k in range(end, len(text)) if not text[end:k].strip()}
+    for length in range(text.index("facet") + 1, len(text)):
+        whole = sum(end <= length for end in ends)
+        if length in between or whole == len(ends):
+            assert len(read(text[:length], "a.stl").triangles) == whole
+        else:
+            with pytest.raises(DataFileError, match=r"cut off|line \d+: a vertex|has no triangle"):
+                read(text[:length], "a.stl")
+
+
+def test_a_half_box_names_what_is_missing(read):
+    text = box_text()
+    cut = text.index("endfacet", len(text) // 2) + 1
+    for half in (text[:cut], text[: cut - 1], " ".join(text[:cut].split())):
+        with pytest.raises(DataFileError, match="cut off within a facet: 'endfacet' is missing"):
+            read(half, "a.stl")
+    next_facet = text.index("facet normal", cut + 8)
+    for cut_off in (text[: next_facet + 3], " ".join(text[: next_facet + 3].split())):
+        with pytest.raises(DataFileError, match="cut off: its last word is 'fac'"):
+            read(cut_off, "a.stl")
+    assert len(read(text.replace("endsolid", "endsolid f"), "a.stl").triangles) == 12
+    with pytest.raises(DataFileError, match="has no triangle"):
+        read(SQUARE + "f 1 2 3 4\n", "a.stl")
 
 
 # ------------------------------------------------------------------------- far from the origin

@@ -5,21 +5,21 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
-from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import zstandard
 
+from volery.bridges.logs.bag_names import bag_files_in, is_named_after, is_one_bag
 from volery.bridges.logs.budgets import MAX_CHUNK_BYTES, UnpackingBudget
 from volery.bridges.logs.records import file_signature
 from volery.core.errors import RecordingError
 
 _METADATA = "metadata.yaml"
-_SUFFIXES = (".mcap", ".db3")
-_PACKED = (".zstd", ".zst")
 _MAX_METADATA_BYTES = 4 << 20
 _PIECE_BYTES = 1 << 20
+_MOST_NAMES = 10
+"""Files that an error lists."""
 
 
 class BagFiles:
@@ -134,7 +134,7 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
     """Returns the files of a bag in order, and what a folder lacks: files, and metadata.
 
     A recorder that is killed leaves a folder without `metadata.yaml`, and files may be renamed.
-    Raises `RecordingError` if a folder has no such files.
+    Raises `RecordingError` if a folder has no such files, or files of several bags.
     """
     if not path.is_dir():
         return [path], "", ""
@@ -143,14 +143,29 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
     missing = [file.name for file in files if not file.is_file()]
     if files and not missing:
         return files, "", ""
-    present = _in_order(file for file in path.iterdir() if file.is_file() and _is_part(file.name))
+    present = bag_files_in(path)
     if not present:
         raise RecordingError(f"{path}: the folder holds no .mcap and no .db3 file of a ROS 2 bag")
+    if not is_one_bag(present):
+        others, present = present, [file for file in files if file.is_file()]
+        if not present:
+            raise RecordingError(
+                f"{path}: {doubt or f'{_METADATA} names others'}, and the names of its files are "
+                f"not those of one bag ({path.name}_0, {path.name}_1): {_some(others)}; name one "
+                "of them"
+            )
     instead = f"; read without it: {', '.join(file.name for file in present)}"
-    if not missing:
-        return present, "", doubt + instead
-    lost = f"{_METADATA} names files that are missing: {', '.join(missing)}{instead}"
-    return present, lost, ""
+    if missing:
+        lost = f"{_METADATA} names files that are missing: {', '.join(missing)}{instead}"
+        return present, lost, ""
+    if len(present) > 1 and not is_named_after(present, path):
+        return present, f"{doubt}; read as one bag: {_some(present)}", ""
+    return present, "", doubt + instead
+
+
+def _some(files: list[Path]) -> str:
+    more = f" and {len(files) - _MOST_NAMES} more" if len(files) > _MOST_NAMES else ""
+    return ", ".join(file.name for file in files[:_MOST_NAMES]) + more
 
 
 def _listed(file: Path) -> tuple[list[str], str]:
@@ -170,15 +185,3 @@ def _listed(file: Path) -> tuple[list[str], str]:
         reason = " ".join(str(error).split())[:100]
         return [], f"{_METADATA} cannot be read ({reason})"
     return found, "" if found else f"{_METADATA} names no file"
-
-
-def _is_part(name: str) -> bool:
-    plain = name
-    for suffix in _PACKED:
-        plain = plain.removesuffix(suffix)
-    return plain.endswith(_SUFFIXES)
-
-
-def _in_order(parts: Iterable[Path]) -> list[Path]:
-    """Returns paths in the order of their numbers: `x_0.db3` to `x_10.db3`."""
-    return sorted(parts, key=lambda part: (len(part.name), part.name))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.bridges.logs.bag_files import BagFiles
-from volery.bridges.logs.records import file_signature
+from volery.bridges.logs.records import file_signature, log_format
 from volery.bridges.logs.recovery import write_mcap
 from volery.bridges.logs.ros2_bags import BagWalk
 from volery.core.errors import RecordingError
@@ -31,6 +31,7 @@ def one_file(path: Path) -> Iterator[OneFile]:
     or copied, or holds no message.
     """
     if not path.is_dir() and file_signature(path) not in ("sqlite", "zstd"):
+        log_format(path, "a ROS 2 bag")
         yield OneFile(path, "")
         return
     with BagFiles(path) as files:

@@ -33,6 +33,7 @@ _MARKS = {
     MCAP_MAGIC: "mcap",
     BAG_MAGIC: "bag",
     b"#ROSBAG V1": "bag 1",
+    b"ULogEnc": "encrypted ulog",
     b"ULog": "ulog",
     b"SQLite format 3\0": "sqlite",
     b"\x28\xb5\x2f\xfd": "zstd",
@@ -47,6 +48,7 @@ _MARK_BYTES = 16
 _HINTS = {
     "bag 1": "; it is a bag of an older version: `rosbag filter OLD NEW True` of ROS 1 converts it",
     "ulog": "; it is a ULog, which `open_log` and `volery info` read",
+    "encrypted ulog": "; it is an encrypted log of PX4 (Log Encryption), whose tools decrypt it",
     "sqlite": "; it is a file of a ROS 2 bag, which `open_log`, `volery info` and `play` read",
     **{
         kind: f"; it is compressed by {kind}: `{tool}` unpacks it"
@@ -253,20 +255,17 @@ def file_signature(path: Path) -> str:
     return found
 
 
-def log_format(path: Path) -> str:
+def log_format(path: Path, *others: str) -> str:
     """Returns `mcap` or `bag`, by the file's first bytes.
 
-    Raises
-    ------
-    RecordingError
-        There is no such file, or it is no log.
-
+    others: formats that the caller also reads, for the error. Raises `RecordingError` if there is
+    no such file, or it is no log of these two formats.
     """
     found = file_signature(path)
     if found in _WALKS:
         return found
-    hint = _HINTS.get(found, "")
-    raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0){hint}")
+    *names, last = ("an MCAP log", "a ROS 1 bag (version 2.0)", *others)
+    raise RecordingError(f"{path}: neither {', '.join(names)} nor {last}{_HINTS.get(found, '')}")
 
 
 def _body(file: BinaryIO, length: int) -> bytes:

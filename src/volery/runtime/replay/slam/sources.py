@@ -107,7 +107,7 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
     if path.is_dir() or file_signature(path) in ("sqlite", "zstd"):
         return LogSource(path, bag_topics(path), _walk=BagWalk)
     try:
-        log_format(path)
+        log_format(path, "a ROS 2 bag")
     except RecordingError as error:
         if not path.is_file() or path.suffix in (".mcap", ".bag") or path.stat().st_size == 0:
             raise
