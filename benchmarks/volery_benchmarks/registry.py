@@ -342,8 +342,7 @@ BENCHES: dict[str, Bench] = {
             "own, or together as environments; beside a bare loop over the same runs; "
             "`killed_and_resumed`: 1 if the table of a study of 2,000 runs, whose driver was "
             "killed five times, equals that of an uninterrupted one; `ray_...`: on a Ray "
-            "cluster of two network namespaces with one core each, where a worker is killed and the "
-            "link cut",
+            "cluster of two network namespaces with a core each; a worker is killed, the link cut",
             {
                 "sweep_runs_per_s_core": Bound(20.0),
                 "sweep_runs_per_s_core_vectorized": Bound(500.0),

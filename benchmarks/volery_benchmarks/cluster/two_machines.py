@@ -77,7 +77,8 @@ def measure(*, quick: bool = False) -> dict[str, float]:
     runs = _QUICK_RUNS if quick else _RUNS
     with tempfile.TemporaryDirectory() as folder, _namespaces():
         work = Path(folder)
-        study = work / "study.toml"
+        study = work / "study" / "study.toml"  # its folder is copied to the machines
+        study.parent.mkdir()
         study.write_text(_STUDY.format(runs=runs), encoding="utf-8")
         with _cluster(work, nodes=1):
             alone = _fly(study, work / "alone", 1)

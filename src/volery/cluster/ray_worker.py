@@ -8,6 +8,7 @@ takes minutes to notice a machine that falls silent, so each worker is asked for
 from __future__ import annotations
 
 import contextlib
+import os
 import queue
 import socket
 import threading
@@ -30,6 +31,8 @@ _LOOK_S = 2.0
 """Time between two looks at a worker that flies."""
 _SILENCE_S = 6.0
 """Time without a sign of life after which a worker is lost."""
+_MOST_BYTES = 200_000_000
+"""Limit of a study's folder, which each machine receives."""
 _CODE = ["*.py", "*.pyc", "*.so", "*.pth"]
 _LARGE = [".git/", ".venv/", "runs/", "*.mcap", "*.bag", "*.db3"]
 _THREADS = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
@@ -44,6 +47,7 @@ def ray_pool(job: StudyJob, address: str, workers: int | None) -> WorkerPool:
     """
     ray = import_extra("`volery sweep --ray`", "ray", "ray", "cluster", StudyError)
     _check_reachable(address)
+    _check_size(job.folder)
     excluded = [*_LARGE, *([] if job.is_trusted else _CODE)]
     environment = {"working_dir": str(job.folder), "excludes": excluded, "env_vars": _THREADS}
     try:
@@ -65,6 +69,22 @@ def ray_pool(job: StudyJob, address: str, workers: int | None) -> WorkerPool:
         return RayWorker(ray, number, job.results, replies)
 
     return WorkerPool(job, count, start, close=ray.shutdown)
+
+
+def _check_size(folder: Path) -> None:
+    """Raises `StudyError` for a folder that is too large to be copied."""
+    size = 0
+    for place, folders, names in os.walk(folder):
+        folders[:] = [each for each in folders if f"{each}/" not in _LARGE]
+        for name in names:
+            if f"*{Path(name).suffix}" not in _LARGE:
+                with contextlib.suppress(OSError):
+                    size += os.lstat(os.path.join(place, name)).st_size
+        if size > _MOST_BYTES:
+            raise StudyError(
+                f"{folder} holds more than {_MOST_BYTES / 1e6:.0f} MB, too much for each machine "
+                "of the cluster: put the study and its files into a folder of its own"
+            )
 
 
 def _check_reachable(address: str) -> None:

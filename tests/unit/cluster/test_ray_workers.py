@@ -11,6 +11,7 @@ import pytest
 from studies import study_file
 
 from volery.cluster import StudyError, run_study
+from volery.cluster.ray_worker import _check_size as check_size
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("scipy")
@@ -127,6 +128,21 @@ def test_an_address_without_a_cluster_is_refused_at_once(tmp_path, address, reas
     path = study_file(tmp_path, "repetitions = 1\nmetrics = ['success']\n")
     with pytest.raises(StudyError, match=rf"--ray {address}: {reason}"):
         run_study(path, tmp_path / "out", ray=address)
+
+
+def test_a_large_folder_is_not_copied(tmp_path, monkeypatch):
+    pytest.importorskip("ray")
+    monkeypatch.setattr("volery.cluster.ray_worker._MOST_BYTES", 1000)
+    path = study_file(tmp_path, "repetitions = 1\nmetrics = ['success']\n")
+    (tmp_path / "runs").mkdir()
+    for name in ("runs/large.bin", "large.mcap"):  # neither is copied
+        (tmp_path / name).write_bytes(bytes(2000))
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        check_size(tmp_path)
+        (tmp_path / "world.glb").write_bytes(bytes(2000))
+        with pytest.raises(StudyError, match="put the study and its files into a folder of its"):
+            run_study(path, tmp_path / "out", ray=address)
 
 
 def test_without_ray_the_command_is_named(tmp_path, monkeypatch):
