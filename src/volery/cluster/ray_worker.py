@@ -31,6 +31,7 @@ _LOOK_S = 2.0
 """Time between two looks at a worker that flies."""
 _SILENCE_S = 6.0
 """Time without a sign of life after which a worker is lost."""
+_FAREWELL_S = 30.0
 _MOST_BYTES = 200_000_000
 """Limit of a study's folder, which each machine receives."""
 _CODE = ["*.py", "*.pyc", "*.so", "*.pth"]
@@ -65,10 +66,18 @@ def ray_pool(job: StudyJob, address: str, workers: int | None) -> WorkerPool:
         ray.shutdown()
         raise StudyError(f"--ray {address}: the cluster has no processor")
 
-    def start(number: int, replies: Replies) -> RayWorker:
-        return RayWorker(ray, number, job.results, replies)
+    started: list[RayWorker] = []
 
-    return WorkerPool(job, count, start, close=ray.shutdown)
+    def start(number: int, replies: Replies) -> RayWorker:
+        started.append(RayWorker(ray, number, job.results, replies))
+        return started[-1]
+
+    def leave() -> None:
+        for worker in started:
+            worker.join()
+        ray.shutdown()
+
+    return WorkerPool(job, count, start, close=leave)
 
 
 def _check_size(folder: Path) -> None:
@@ -116,7 +125,12 @@ class RayWorker(PoolWorker):
         self._pending: queue.SimpleQueue[Any] = queue.SimpleQueue()
         """Answers in the order of their questions; None: there will be no others."""
         self._pending.put(self._actor.greet.remote())
-        threading.Thread(target=self._listen, args=(replies,), daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, args=(replies,), daemon=True)
+        self._listener.start()
+
+    def join(self) -> None:
+        """Waits for the end of its thread: Ray crashes if it shuts down while a thread uses it."""
+        self._listener.join(_FAREWELL_S)
 
     def send_job(self, job: StudyJob) -> None:
         """Hands over the study."""
