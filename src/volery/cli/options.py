@@ -96,7 +96,7 @@ class PageCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Implements typer's method for the arguments of the command line."""
-        words = [word.replace("--port=", "--page=") for word in _with_addresses(args)]
+        words = [re.sub("^--port=", "--page=", word) for word in _with_addresses(args)]
         return super().parse_args(ctx, ["--page=" if word == "--page" else word for word in words])
 
 

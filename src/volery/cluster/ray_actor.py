@@ -15,7 +15,7 @@ class RunActor:
     """Flies batches of one study; its working folder is a copy of the study's."""
 
     def __init__(self) -> None:
-        self._logs = Path(tempfile.mkdtemp(prefix="volery_sweep_"))
+        self._logs = Path(tempfile.mkdtemp(prefix="logs_", dir=Path.cwd()))  # Ray removes both
 
     def greet(self) -> Preparation:
         """Returns its version."""

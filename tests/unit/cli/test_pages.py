@@ -45,6 +45,10 @@ def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, sp
     assert (options.scenario, options.page, options.speed) == ("hover", page, speed)
 
 
+def test_a_value_that_contains_the_option_is_kept(page_of):
+    assert page_of("hover", "--record=my--port=1.mcap").record.name == "my--port=1.mcap"
+
+
 @pytest.mark.parametrize(
     ("words", "host", "port"),
     [
