@@ -8,7 +8,15 @@ import typer
 
 from volery.cli.error_reporting import word_logs
 from volery.cli.examples import examples
-from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, serve
+from volery.cli.flight_commands import (
+    launch,
+    list_scenarios,
+    play,
+    px4,
+    run,
+    serve,
+    worker,
+)
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.learning_commands import evaluate, export_policy, train
 from volery.cli.log_commands import convert, info, recover, report, slam
@@ -61,6 +69,7 @@ app.command("list")(list_scenarios)
 app.command(context_settings={"ignore_unknown_options": True})(examples)
 app.command(cls=ServeCommand)(serve)
 for _command in (
+    worker,
     play,
     sweep,
     info,

@@ -45,6 +45,9 @@ def run(
     wait_timeout: run_options.WaitTimeout = DEFAULT_TIMEOUT_S,
     threads: ThreadsOption = None,
     replay_commands: run_options.ReplayCommands = None,
+    workers: run_options.Workers = None,
+    listen: run_options.Listen = None,
+    drop_lost: run_options.DropLost = False,
     record: run_options.Record = None,
     topics: run_options.Topics = None,
     exclude: run_options.Exclude = None,
@@ -115,10 +118,34 @@ def run(
         wait_for=tuple(name for names in wait_for or () for name in names.split(",") if name),
         wait_timeout_s=wait_timeout,
         mavlink_key=mavlink_key,
+        workers=workers,
+        listen=listen,
+        drop_lost=drop_lost,
     )
     code = fly(options)
     if code:
         raise typer.Exit(code)
+
+
+@guarded
+def worker(
+    join: Annotated[
+        str,
+        typer.Option(metavar="HOST[:PORT]", help="Join the leader there (volery run --listen)."),
+    ],
+    token: Annotated[
+        str | None, typer.Option(envvar="VOLERY_TOKEN", help="Know this token of the leader's run.")
+    ] = None,
+    threads: ThreadsOption = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run node code of this machine that the leader names.")
+    ] = False,
+    traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
+) -> None:
+    """Serve a part of a run that is divided among machines, to its end."""
+    from volery.cli.division import join_run
+
+    join_run(join, token, threads, trust=trust)
 
 
 @guarded

@@ -12,6 +12,7 @@ from typer.core import TyperCommand
 
 # Options by their panel in help texts.
 flight_option = partial(typer.Option, rich_help_panel="Flight")
+division_option = partial(typer.Option, rich_help_panel="Several machines")
 file_option = partial(typer.Option, rich_help_panel="Output files")
 bridge_option = partial(typer.Option, rich_help_panel="Bridges and access")
 ros2_option = partial(typer.Option, rich_help_panel="ROS 2")

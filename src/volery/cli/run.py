@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from volery.cli.bridge_checks import check_bridges, token_gaps
 from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.command_replay import recorded_flight, recorded_scenario
+from volery.cli.division import threads_of, workers_of
 from volery.cli.error_reporting import warn
 from volery.cli.flight import CommandLineFlight, RunOptions
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
@@ -21,6 +22,7 @@ from volery.cli.trust import with_trust
 from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
 from volery.core.errors import CommandError, ScenarioError
+from volery.runtime.build.share import WHOLE
 from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
@@ -82,19 +84,29 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
         check_record(options.record, overwrite=options.overwrite)
     if options.report is not None:
         check_report(options.report, overwrite=options.overwrite)
-    threads = _THREADS if options.threads is None else options.threads
+    threads = threads_of(options, _THREADS)
     change = _Change(options)
     page.building(scenario)
     return_large_blocks()
-    with FlightProgress(scenario.name, scenario.duration_s) as progress:
+    stopped = lambda: interrupts.pressed  # noqa: E731
+    with (
+        workers_of(options, scenario, stopped) as workers,
+        FlightProgress(scenario.name, scenario.duration_s) as progress,
+    ):
         simulation = Simulation(
-            scenario, threads=threads, recordings=options.recordings, on_load=change.ask
+            scenario,
+            threads=threads,
+            recordings=options.recordings,
+            on_load=change.ask,
+            share=WHOLE if workers is None else workers.gather(),
         )
         change.quit = simulation.clock.quit
         if flight is not None:
             simulation.replay_commands(flight)
         try:
             interrupts.be_gentle()
+            if workers is not None:
+                simulation.divide(workers.connect)
             bridges = open_bridges(simulation.gateway, options, simulation.uavs)
             with spared_objects(), bridges, page.showing(simulation):
                 code = CommandLineFlight(simulation, options, progress, interrupts).fly()
@@ -167,6 +179,8 @@ class _Change:
                 raise CommandError(f"this run writes a file of one flight ({flag})")
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
+        if options.workers is not None:
+            raise CommandError("this run is divided among machines for one flight (--workers)")
         if options.replay_commands is not None:
             raise CommandError("this run replays one flight (--replay-commands)")
         if isinstance(request, LogRequest):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.options import bridge_option, file_option, flight_option
+from volery.cli.options import bridge_option, division_option, file_option, flight_option
 
 # Flight.
 Scenario = Annotated[str, typer.Argument(help="Scenario name (volery list) or TOML file.")]
@@ -35,6 +35,27 @@ WaitTimeout = Annotated[
 ]
 ReplayCommands = Annotated[
     Path | None, flight_option(help="Replay the client commands of this log.")
+]
+
+# Several machines.
+Workers = Annotated[
+    int | None,
+    division_option(
+        min=1, max=64, help="Divide the run among this number of workers and this process."
+    ),
+]
+Listen = Annotated[
+    str | None,
+    division_option(
+        metavar="HOST[:PORT]",
+        help="Wait there for workers of other machines (volery worker); default: start them here.",
+    ),
+]
+DropLost = Annotated[
+    bool,
+    division_option(
+        "--drop-lost", help="Continue without a lost worker's nodes; default: take them over."
+    ),
 ]
 
 # Output files.

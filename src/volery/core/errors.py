@@ -56,6 +56,10 @@ class GraphError(VoleryError):
     """A topic, service or message does not fit: wrong type, unknown name, invalid rate."""
 
 
+class DivisionError(VoleryError):
+    """A run cannot be divided among machines, or a divided run cannot go on."""
+
+
 class BridgeError(VoleryError):
     """A bridge to the graph cannot be opened, or its peer breaks the protocol."""
 

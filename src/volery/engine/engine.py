@@ -71,6 +71,22 @@ class Sink(Protocol):
         """Delivers all queued messages."""
 
 
+class Division(Protocol):
+    """Keeps the machines of a divided run in lock step; each has an engine of its own."""
+
+    def begin_tick(self, last_step: int) -> int:
+        """Takes over what other machines have published; returns the step at which the tick ends.
+
+        last_step: where it ends at the latest.
+        """
+
+    def end_tick(self) -> None:
+        """Passes on what this machine has published in the tick."""
+
+    def end_round(self) -> None:
+        """Called when the effects of some commands of clients have been delivered."""
+
+
 class Engine:
     """Advances the simulation in lock step; see `stages.STAGES` for the order."""
 
@@ -103,6 +119,8 @@ class Engine:
         continues."""
         self.is_broken_off = False
         """Whether the end of the run aborted the last barrier with lock-step partners."""
+        self.division: Division | None = None
+        """Other machines that share the run; None: it is not divided."""
         self.repeats: Repeats | None = None
         """Recorded commands to replay."""
         self.turn = 0
@@ -226,6 +244,8 @@ class Engine:
             self.sink.deliver()
         finally:
             self.stands = stood
+        if self.division is not None:
+            self.division.end_round()
         self.turn += self._commanded
         self._commanded = False
 

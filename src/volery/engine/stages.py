@@ -26,13 +26,16 @@ class Tick:
     """Step at which the run ends; the tick ends earlier if something is due."""
 
 
-def take_commands(engine: Engine, _tick: Tick) -> None:
+def take_commands(engine: Engine, tick: Tick) -> None:
     """Executes the commands of other threads since the last tick, in order of arrival.
 
     The state is consistent here, so an action may restore an earlier state. Publications are
-    delivered at once, so that they affect the physics steps of this tick.
+    delivered at once, so that they affect the physics steps of this tick. In a divided run, the
+    machines then agree on the end of the tick.
     """
     engine.process_commands()
+    if engine.division is not None:
+        tick.last_step = engine.division.begin_tick(tick.last_step)
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
@@ -94,6 +97,12 @@ def meet_partners(engine: Engine, _tick: Tick) -> None:
         engine.sink.deliver()
 
 
+def exchange(engine: Engine, _tick: Tick) -> None:
+    """Passes what the machines of a divided run have published to each other."""
+    if engine.division is not None:
+        engine.division.end_tick()
+
+
 STAGES: tuple[Stage, ...] = (
     take_commands,
     advance_vehicles,
@@ -102,4 +111,5 @@ STAGES: tuple[Stage, ...] = (
     raise_events,
     publish,
     meet_partners,
+    exchange,
 )

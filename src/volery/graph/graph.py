@@ -124,6 +124,12 @@ class Graph:
         a message caused by a client is logged, and does not end the run."""
         self.on_refused: Callable[[Refusal], None] = lambda _refusal: None
         """Receives what `refuse` says, in the simulation's thread."""
+        self.on_node_call: Callable[[str, Any], None] = lambda _service, _request: None
+        """Receives the service and the request of each call by a node, before the call."""
+        self.sender: Publisher | None = None
+        """Publisher of the message that is being delivered; None: none is."""
+        self.changes = 0
+        """Number of changes of subscriptions so far."""
         self._members = threading.RLock()
         """Guards changes of topics, publishers, subscribers and services."""
 
@@ -152,24 +158,32 @@ class Graph:
         return any(listener.matches(topic) for listener in self._to_all)
 
     def advertise(
-        self, topic: str, msgtype: str | type[Any], *, latched: bool = False
+        self,
+        topic: str,
+        msgtype: str | type[Any],
+        *,
+        latched: bool = False,
+        local: bool = False,
     ) -> Publisher:
         """Adds a publisher. Raises `GraphError` if the topic has another type.
 
         The type prevails over that of subscriptions of other threads, which end; see `attach`.
 
-        latched: later subscribers receive the publisher's last message.
+        latched: later subscribers receive the publisher's last message. local: in a divided run,
+        only this machine has the publisher, so that its messages cross to the others.
         """
         with self._members:
             found = self._decided_topic(topic, msgtype)
             found.publishers += 1
+            found.num_local += local
             found.latched = found.latched or latched
-        return Publisher(self, found, latched=latched)
+        return Publisher(self, found, latched=latched, local=local)
 
     def remove_publisher(self, publisher: Publisher, topic: Topic) -> None:
         """Removes a publisher; used by `Publisher`."""
         with self._members:
             topic.publishers -= 1
+            topic.num_local -= publisher.local
             topic.last_messages.pop(publisher, None)
             self._drop_unused(topic)
 
@@ -192,6 +206,7 @@ class Graph:
         with self._members:
             found = self._decided_topic(topic, self._type_of(topic, msgtype))
             found.callbacks.append(callback)
+            self.changes += 1
         self._send_latched([found], callback)
         return Subscription(found.callbacks, callback, lambda: self._drop_unused(found))
 
@@ -217,6 +232,7 @@ class Graph:
             found.external.append(callback)
             found.on_ended.append(on_ended)
             found.num_attached += 1
+            self.changes += 1
 
         def leave() -> None:
             found.external.remove(callback)
@@ -237,9 +253,10 @@ class Graph:
         """
         listener = _Listener(callback, matches or _match_all)
         self._to_all.append(listener)
+        self.changes += 1
         meant = [topic for topic in self._topics.values() if listener.matches(topic.name)]
         self._send_latched(meant, listener)
-        return Subscription(self._to_all, listener)
+        return Subscription(self._to_all, listener, self._count_change)
 
     def topics(self) -> list[TopicInfo]:
         """Returns all topics, sorted by name."""
@@ -258,6 +275,21 @@ class Graph:
         """Returns the number of subscribers to a topic."""
         found = self._topics.get(topic)
         return 0 if found is None else len(found.callbacks)
+
+    def local_topics(self) -> dict[str, tuple[str, bool]]:
+        """Returns type and latching of the topics with a publisher that only this machine has."""
+        with self._members:
+            return {t.name: (t.msgtype, t.latched) for t in self._topics.values() if t.num_local}
+
+    def has_local_publisher(self, topic: str) -> bool:
+        """Returns whether a publisher of the topic exists on this machine of a divided run only."""
+        found = self._topics.get(topic)
+        return found is not None and found.num_local > 0
+
+    def subscribed_topics(self) -> list[str]:
+        """Returns the names of the topics with subscribers."""
+        with self._members:
+            return [topic.name for topic in self._topics.values() if topic.callbacks]
 
     def topic_type(self, topic: str) -> str | None:
         """Returns the type of a topic, or None if the topic does not exist."""
@@ -309,12 +341,12 @@ class Graph:
         try:
             self._deliver()
         finally:
-            self._answers = before
+            self._answers, self.sender = before, None
 
     def _deliver(self) -> None:
         while self._queue:
             topic, published, sender, only, client, answers = self._queue.popleft()
-            self._answers = answers + 1
+            self._answers, self.sender = answers + 1, sender
             if only is not None:
                 if only in topic.callbacks or only in self._to_all:
                     only(published)
@@ -403,8 +435,12 @@ class Graph:
         finally:
             self._queue.extend(reversed(after))
 
+    def _count_change(self) -> None:
+        self.changes += 1
+
     def _drop_unused(self, topic: Topic) -> None:
         """Removes the oldest unused topic when there are more than MOST_UNUSED."""
+        self.changes += 1
         with self._members:
             if topic.used:
                 return

@@ -36,6 +36,7 @@ class Topic:
         self.on_ended: list[Callable[[str], None]] = []  # learn why external subscriptions end
         self.num_attached = 0  # number of external subscriptions so far
         self.publishers = 0
+        self.num_local = 0  # number of publishers that only this machine of a divided run has
         self.messages = 0
         self.answer_ns = -1  # time of the last message published in response to another one ...
         self.answers = 0  # ... and the number of such messages at that instant
@@ -77,10 +78,14 @@ class _Delivery(Protocol):
 class Publisher:
     """Publishes messages of one type on one topic."""
 
-    def __init__(self, graph: _Delivery, topic: Topic, *, latched: bool = False) -> None:
+    def __init__(
+        self, graph: _Delivery, topic: Topic, *, latched: bool = False, local: bool = False
+    ) -> None:
         self._graph = graph
         self._topic = topic
         self.latched = latched
+        self.local = local
+        """Whether only this machine of a divided run has the publisher; see `Graph.advertise`."""
         self.owner = ""
         """Full name of the publisher's node; empty: none."""
         self.lasting = False

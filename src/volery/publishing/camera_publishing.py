@@ -86,15 +86,15 @@ class CameraPublisher:
         self._outlets: dict[str, list[_Outlet]] = {}
         self._pixels: dict[str, int] = {}
 
-    def announce(self, camera: Camera) -> None:
-        """Advertises a camera's topics."""
+    def announce(self, camera: Camera, *, local: bool) -> None:
+        """Advertises a camera's topics; local: in a divided run, this machine samples it."""
         sensor = camera.sensor
         self._cameras[sensor.path] = camera
         outlets = self._outlets[sensor.path] = []
         for topic in _TOPICS:
             if parts := topic.parts(camera.settings):
                 name = f"/{sensor.path}{topic.suffix}"
-                publisher = self._graph.advertise(name, topic.message_class)
+                publisher = self._graph.advertise(name, topic.message_class, local=local)
                 outlets.append(_Outlet(publisher, topic.message, parts))
 
     def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:

@@ -117,20 +117,34 @@ class GraphPublisher:
             if kind is not BatterySamples:
                 self._static.append(_mount_transform(base, sensor.path, mount))
 
-    def announce_camera(self, camera: Camera, mount: Mount) -> None:
-        """Advertises a camera's topics, and adds the static transforms of its two frames."""
+    def announce_camera(self, camera: Camera, mount: Mount, *, local: bool = True) -> None:
+        """Advertises a camera's topics, and adds the static transforms of its two frames.
+
+        local: in a divided run, this machine samples the camera.
+        """
         self._static_sent = False
-        self.cameras.announce(camera)
+        self.cameras.announce(camera, local=local)
         sensor, optical = camera.sensor, make_mount(attitude_body=OPTICAL_ATTITUDE)
         base = f"{sensor.uav_name}/base_link"
         self._static.append(_mount_transform(base, sensor.path, mount))
         self._static.append(_mount_transform(sensor.path, optical_frame(sensor), optical))
 
-    def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
-        """Advertises a LIDAR's topics and adds its static transform."""
+    def announce_lidar(
+        self,
+        sensor: SensorId,
+        model: LidarModel,
+        topic: str,
+        mount: Mount,
+        *,
+        local: bool = True,
+    ) -> None:
+        """Advertises a LIDAR's topics and adds its static transform.
+
+        local: in a divided run, this machine samples the LIDAR.
+        """
         self._static_sent = False
         self._mounts[sensor.path] = mount
-        self._lidars.announce(sensor, model, topic, mount)
+        self._lidars.announce(sensor, model, topic, mount, local=local)
         if not mount.nods:
             base = f"{sensor.uav_name}/base_link"
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))

@@ -68,16 +68,23 @@ class LidarPublisher:
         self._clouds: dict[str, Publisher] = {}
         self._returns = ReturnsPublisher(graph)
 
-    def announce(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
-        """Advertises a LIDAR's topics; all echoes go to `echoes`, in the scan topic's namespace."""
-        self._returns.announce(sensor, mount, topic)
+    def announce(
+        self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount, *, local: bool
+    ) -> None:
+        """Advertises a LIDAR's topics; all echoes go to `echoes`, in the scan topic's namespace.
+
+        local: in a divided run, this machine samples the LIDAR.
+        """
+        self._returns.announce(sensor, mount, topic, local=local)
         if not isinstance(model.scan, PlanarScan):
-            self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2)
+            self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2, local=local)
             return
-        self._scans[sensor.path] = self._graph.advertise(topic, LaserScan)
+        self._scans[sensor.path] = self._graph.advertise(topic, LaserScan, local=local)
         if model.echoes > 1:
             beside = f"{topic.rsplit('/', 1)[0]}/echoes"
-            self._echoes[sensor.path] = self._graph.advertise(beside, MultiEchoLaserScan)
+            self._echoes[sensor.path] = self._graph.advertise(
+                beside, MultiEchoLaserScan, local=local
+            )
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's LIDARs."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
@@ -12,6 +13,7 @@ from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
 from volery.core.uncopied import Uncopied
+from volery.engine.engine import Division
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
@@ -22,6 +24,7 @@ from volery.runtime.build.engine import build_engine
 from volery.runtime.build.gateway import build_gateway
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
+from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.build.start_check import check_start
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
@@ -32,6 +35,7 @@ from volery.runtime.conditional_runs import (
     Awaited,
     ConditionalRuns,
 )
+from volery.runtime.division_parts import DivisionParts
 from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.facets.clock import SimulationClock
 from volery.runtime.facets.diagnostics import SimulationDiagnostics
@@ -46,6 +50,7 @@ from volery.runtime.monitoring.progress import Progress
 from volery.runtime.monitoring.progress_bar import progress_bar
 from volery.runtime.monitoring.status import StatusSources
 from volery.runtime.replay.command_log import CommandLog
+from volery.runtime.replay.command_repeater import CommandRepeater
 from volery.runtime.replay.command_replay import CommandReplay
 from volery.runtime.replay.scenario_record import tell_origin
 from volery.runtime.run_loop import RunLoop
@@ -112,6 +117,7 @@ class Simulation(Uncopied):
         recordings: Path | None = None,
         on_load: OnLoad | None = None,
         shelf: ScenarioCatalog | None = None,
+        share: Share = WHOLE,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
@@ -125,7 +131,7 @@ class Simulation(Uncopied):
         with compiled(needs_of(scenario)):
             world = build_world(scenario, threads)
         self._pacer = pacer = Pacer()
-        connected = build_engine(scenario, world, pacer)
+        connected = build_engine(scenario, world, pacer, share)
         self._engine = engine = connected.engine
         self.graph = graph = connected.graph
         self._loop = RunLoop(engine, pacer, scenario.duration_s, self._has_ended)
@@ -137,7 +143,7 @@ class Simulation(Uncopied):
         tell_origin(graph, scenario)
         world_topic = WorldTopic(graph, lambda: self.geometry)
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
-        self._manager = manager = build_vehicles(scenario, connected, world, self._runs)
+        self._manager = manager = build_vehicles(scenario, connected, world, self._runs, share)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
         self.uavs = UavView(manager.uavs)
         self.operators = ControlAuthority(lambda: tuple(self.uavs), self.graph.moved_uavs.of)
@@ -306,6 +312,23 @@ class Simulation(Uncopied):
         self._check_open()
         self._engine.process_commands(math.inf)
         self._monitor.look()
+
+    def divide(self, connect: Callable[[DivisionParts], Division]) -> None:
+        """Keeps this machine in lock step with others that share the run; before the first step.
+
+        connect: returns the connection to the other machines.
+        """
+        engine, graph, manager = self._engine, self.graph, self._manager
+        repeater = CommandRepeater(graph, engine, self._pacer, self.commands)
+        engine.division = connect(
+            DivisionParts(engine, graph, self.commands, repeater, lambda: tuple(manager.nodes))
+        )
+
+    def follow(self) -> None:
+        """Advances a worker's part of a divided run until its `Division` raises an error."""
+        self._check_open()
+        with reported_failures(self.graph), self._loop.occupied():
+            self._engine.advance_to(sys.maxsize)
 
     # ------------------------------------------------------------------------------------- results
 

@@ -45,13 +45,18 @@ class MirroredGraph(Graph):
     # ------------------------------------------------------------------------------------ topics
 
     def advertise(
-        self, topic: str, msgtype: str | type[Any], *, latched: bool = False
+        self,
+        topic: str,
+        msgtype: str | type[Any],
+        *,
+        latched: bool = False,
+        local: bool = False,
     ) -> Publisher:
         """Advertises a topic here and remotely."""
         name = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         self._link.advertise(topic, name, latched=latched)
-        local = super().advertise(topic, name, latched=latched)
-        return _RemotePublisher(local, self._link, lambda: not self.publishers(topic))
+        own = super().advertise(topic, name, latched=latched, local=local)
+        return _RemotePublisher(own, self._link, lambda: not self.publishers(topic))
 
     def subscribe(
         self,

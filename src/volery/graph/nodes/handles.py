@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.message_copies import message_checker, message_copier
@@ -15,6 +15,15 @@ from volery.graph.qos import QoSProfile
 from volery.graph.topics import Publisher, Subscription
 
 Callback = Callable[..., Any]
+
+
+class NodeEndpoints(NamedTuple):
+    """Full names of the topics and services that a node uses at present."""
+
+    publishes: frozenset[str]
+    subscribes: frozenset[str]
+    serves: frozenset[str]
+    calls: frozenset[str]
 
 
 class Handle:

@@ -31,7 +31,12 @@ from volery.graph.messages import Published, message_type
 from volery.graph.nodes.coroutines import advance, is_coroutine, result_of
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.nodes.failures import add_frames, place_of
-from volery.graph.nodes.handles import NodePublisher, NodeService, NodeSubscription
+from volery.graph.nodes.handles import (
+    NodeEndpoints,
+    NodePublisher,
+    NodeService,
+    NodeSubscription,
+)
 from volery.graph.nodes.launch import Context, present_launch
 from volery.graph.nodes.logger import LOG_TYPE, ROSOUT, NodeLogger
 from volery.graph.nodes.parameter_methods import ParameterMethods
@@ -120,6 +125,15 @@ class Node(ParameterMethods):
 
     # ------------------------------------------------------------------------------ the contract
 
+    def endpoints(self) -> NodeEndpoints:
+        """Returns the topics and services that the node uses."""
+        return NodeEndpoints(
+            frozenset(handle.topic for handle in self._handles(NodePublisher)),
+            frozenset(handle.topic for handle in self._handles(NodeSubscription)),
+            frozenset(handle.srv_name for handle in self._handles(NodeService)),
+            frozenset(handle.service for handle in self._handles(Client)),
+        )
+
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
         """Returns functions that compile the numba code that the node calls, each a part of it.
@@ -172,7 +186,9 @@ class Node(ParameterMethods):
         """
         profile = profile_of(qos_profile)
         latched = profile.latched or latched
-        publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
+        publisher = self._context.graph.advertise(
+            self.resolve(topic), msg_type, latched=latched, local=True
+        )
         publisher.owner = self.full_name
         handle = NodePublisher(publisher, self.__executor, profile)
         self.__handles[handle] = handle.cancel
@@ -292,7 +308,7 @@ class Node(ParameterMethods):
         """Creates a client of a service; `srv_type` is as for `create_service`."""
         kind = service_type(srv_type)
         message_type(f"{kind}_Request")
-        return Client(
+        client = Client(
             self._context.graph,
             self.resolve(srv_name),
             kind,
@@ -301,6 +317,8 @@ class Node(ParameterMethods):
             run=self.__run,
             receive=self.__received,
         )
+        self.__handles[client] = client.destroy
+        return client
 
     def destroy_publisher(self, publisher: NodePublisher) -> bool:
         """Destroys a publisher; returns whether it belonged to the node."""
@@ -344,7 +362,7 @@ class Node(ParameterMethods):
 
     def destroy_client(self, client: Client) -> bool:
         """Destroys a client; returns True."""
-        client.destroy()
+        self.__release(client)
         return True
 
     def destroy_node(self) -> None:

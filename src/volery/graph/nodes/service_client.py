@@ -150,7 +150,9 @@ class Client:
             raise GraphError(
                 f"a node with a latency cannot wait for service '{self.service}': use call_async"
             )
-        return self._receive(self._graph.call(self.service, self._filled(request)))
+        filled = self._filled(request)
+        self._graph.on_node_call(self.service, filled)
+        return self._receive(self._graph.call(self.service, filled))
 
     def call_async(self, request: Any | None = None) -> Future:
         """Calls; the response comes at once, or later from an external server.
@@ -190,6 +192,7 @@ class Client:
                 lambda response: settle(lambda: future.set_result(self._receive(response)), here),
                 lambda error: settle(lambda: future.set_exception(error), here),
             )
+            self._graph.on_node_call(self.service, request)
             self._graph.call_async(self.service, request, reply)
 
         if self._executor is None or not self._executor.defer(call):

@@ -13,6 +13,7 @@ from volery.runtime.build.fleet import add_bodies, build_fleet
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors
 from volery.runtime.build.sensors import build_banks
+from volery.runtime.build.share import WHOLE, Share
 from volery.scenario.schema import Scenario
 from volery.world.scene import Scene
 
@@ -30,8 +31,12 @@ class Assembly:
     estimation: Estimation | None
 
 
-def assemble(scenario: Scenario, starts: Sequence[StartPose], scene: Scene) -> Assembly:
+def assemble(
+    scenario: Scenario, starts: Sequence[StartPose], scene: Scene, share: Share = WHOLE
+) -> Assembly:
     """Builds the UAVs of `starts` and replaces the bodies in `scene` by theirs.
+
+    share: the UAVs whose LIDARs and cameras get a bank.
 
     Raises `ScenarioError` or `DataFileError` if a part cannot be built; the scene is then
     unchanged.
@@ -39,6 +44,6 @@ def assemble(scenario: Scenario, starts: Sequence[StartPose], scene: Scene) -> A
     fleet = build_fleet(scenario, starts, tuple(start.name for start in starts))
     fitted = fit_sensors(scenario, starts)
     estimation = build_estimation(scenario, fitted, fleet)
-    banks = build_banks(scenario, fitted, fleet, scene, estimation)
+    banks = build_banks(scenario, fitted, fleet, scene, estimation, share)
     add_bodies(scene, starts)
     return Assembly(fleet, fitted, banks, estimation)

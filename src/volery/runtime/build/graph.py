@@ -20,20 +20,26 @@ from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.node_loading import start_node
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import RESULT_OF, SensorInstance
+from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.camera import CameraSensor
 from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
 from volery.sensors.samples import JointAngles
 
 
-def announce_sensors(publisher: GraphPublisher, fitted: Sequence[SensorInstance]) -> None:
-    """Advertises the topics of the sensors."""
+def announce_sensors(
+    publisher: GraphPublisher, fitted: Sequence[SensorInstance], share: Share = WHOLE
+) -> None:
+    """Advertises the topics of the sensors; `share` of a divided run samples its own."""
     for sensor in fitted:
+        local = share.serves(sensor.id.uav_name)
         if sensor.lidar is not None:
-            publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
+            publisher.announce_lidar(
+                sensor.id, sensor.lidar, sensor.topic, sensor.mount, local=local
+            )
         elif isinstance(sensor.spec, CameraSensor):
             camera = Camera(sensor.id, sensor.spec, sensor.left)
-            publisher.announce_camera(camera, sensor.mount)
+            publisher.announce_camera(camera, sensor.mount, local=local)
         else:
             kind, spec = RESULT_OF[sensor.spec.kind], sensor.spec
             by_a_node = isinstance(spec, EstimateSensor) and spec.external_odometry is not None

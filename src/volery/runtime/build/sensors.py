@@ -14,6 +14,7 @@ from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.build.geo_reference import denial, local_frame, magnetic_field_map
 from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstance
+from volery.runtime.build.share import DIVIDED_SENSORS, WHOLE, Share
 from volery.runtime.build.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank, SensorGroup
@@ -44,11 +45,16 @@ def build_banks(
     fleet: Fleet,
     scene: Scene,
     estimation: Estimation | None = None,
+    share: Share = WHOLE,
 ) -> list[SensorBank]:
-    """Returns the banks in a fixed order; estimates come last, after their inputs."""
+    """Returns the banks in a fixed order; estimates come last, after their inputs.
+
+    share: the UAVs whose LIDARs and cameras are sampled here.
+    """
     groups: dict[tuple[Any, ...], list[SensorInstance]] = defaultdict(list)
     for sensor in sorted(fitted, key=lambda sensor: sensor.spec.kind == "estimate"):
-        groups[sensor.bank_key].append(sensor)
+        if sensor.spec.kind not in DIVIDED_SENSORS or share.serves(sensor.id.uav_name):
+            groups[sensor.bank_key].append(sensor)
     builder = _Builder(scenario, fleet, scene, estimation)
     banks: list[SensorBank] = [
         FaultableBank(builder.build(group), RESULT_OF[group[0].spec.kind].MEASURED)

@@ -12,6 +12,7 @@ from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
 from volery.runtime.build.engine import ConnectedEngine
 from volery.runtime.build.line_of_sight import LineOfSight
+from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.build.worlds import BuiltWorld
 from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.vehicles.manager import VehicleManager
@@ -20,7 +21,11 @@ from volery.world.forest import Forest
 
 
 def build_vehicles(
-    scenario: Scenario, connected: ConnectedEngine, world: BuiltWorld, runs: ConditionalRuns
+    scenario: Scenario,
+    connected: ConnectedEngine,
+    world: BuiltWorld,
+    runs: ConditionalRuns,
+    share: Share = WHOLE,
 ) -> VehicleManager:
     """Returns the manager of the engine's vehicles, which are not on the graph yet."""
     engine, graph = connected.engine, connected.graph
@@ -36,6 +41,7 @@ def build_vehicles(
         world.terrain,
         runs,
         radio,
+        share,
     )
 
 

@@ -8,6 +8,7 @@ from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
+from volery.graph.nodes.handles import NodeEndpoints
 from volery.graph.nodes.presence import outside_nodes
 from volery.graph.session import Gateway
 from volery.runtime.vehicles.manager import VehicleManager
@@ -42,6 +43,11 @@ class SimulationDiagnostics:
     def stage_cpu_s(self) -> dict[str, float]:
         """CPU seconds of this thread in each stage so far."""
         return dict(self._engine.stage_cpu_s)
+
+    @property
+    def nodes(self) -> dict[str, NodeEndpoints]:
+        """Topics and services that the simulation's nodes use, by the nodes' full names."""
+        return {node.full_name: node.endpoints() for node in self._manager.nodes}
 
     @property
     def image_rates(self) -> dict[str, float]:

@@ -56,6 +56,8 @@ class CommandLog:
         self._ended = False
         self.has_changes = False
         """Whether a command has changed the results of the flight."""
+        self.on_noted: Callable[[ClientCommand], None] = lambda _taken: None
+        """Receives each recorded command that is about to take effect."""
         self.repeats = False
         """Whether a replay is running: clients may observe, and change nothing."""
 
@@ -72,6 +74,7 @@ class CommandLog:
     def note(self, taken: ClientCommand, weight: CommandEffect) -> None:
         """Publishes and stores a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
+        self.on_noted(taken)
         moment = self._engine.moment
         kept = _StoredCommand(self._next_number, self._engine.time_ns, moment, taken, cdr)
         self._next_number += 1

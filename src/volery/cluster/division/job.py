@@ -1,0 +1,121 @@
+"""What a leader hands to a worker before a divided run, as plain data.
+
+A worker of the same machine reads the files of the scenario where they are. To another machine
+travel those that the scenario names; it reads no other files of its own, and starts nodes that ship
+with Volery or are installed there, unless it trusts its leader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from volery.core.errors import DivisionError
+from volery.runtime.build.share import Share
+from volery.scenario.access import ScenarioAccess
+from volery.scenario.load import parse_scenario
+from volery.scenario.schema import Scenario
+
+_MOST_BYTES = 500_000_000
+"""Limit of the files that a scenario names."""
+
+
+@dataclass(frozen=True)
+class DivisionJob:
+    """A worker's part of a divided run."""
+
+    content: dict[str, Any]
+    """The scenario, as plain data."""
+    folder: str
+    """Its folder, for a worker of the same machine; empty: `files` travel."""
+    files: dict[str, bytes]
+    """Contents of the scenario's files by their names."""
+    uavs: tuple[str, ...]
+    """UAVs that the worker serves."""
+    repeated: int = 0
+    """Frames of the leader that a lost worker has answered."""
+
+    def scenario(self, place: Path, *, trust: bool) -> Scenario:
+        """Returns the scenario; its files are written into the folder `place`.
+
+        Raises `ScenarioError`, `DivisionError`.
+        """
+        for name, content in self.files.items():
+            if not _is_inner(name):
+                raise DivisionError(f"the leader's file '{name[:80]}' lies outside of its folder")
+            path = place / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        access = ScenarioAccess(
+            Path(self.folder) if self.folder else place,
+            is_confined=not (trust or self.folder),
+            is_trusted=trust,
+            own_nodes=frozenset(_nodes(self.content)),
+        )
+        where = f"the leader's scenario '{str(self.content.get('name'))[:80]}'"
+        return parse_scenario(self.content, where=where, access=access)
+
+    @property
+    def share(self) -> Share:
+        """UAVs that the worker serves."""
+        return Share(is_leader=False, named=frozenset(self.uavs))
+
+
+def files_of(scenario: Scenario) -> dict[str, bytes]:
+    """Returns the contents of the files that a scenario names, by their names.
+
+    Raises `DivisionError` for files that cannot travel.
+    """
+    folder = Path() if scenario.access.folder is None else scenario.access.folder
+    found: dict[str, bytes] = {}
+    size = 0
+    for name in _texts(scenario.model_dump(exclude_unset=True)):
+        path = folder / name
+        if name in found or not _is_file(path):
+            continue
+        if not _is_inner(name):
+            raise DivisionError(
+                f"{scenario.name}: '{name}' lies outside of the scenario's folder: only files "
+                "below it travel to other machines"
+            )
+        size += path.stat().st_size
+        if size > _MOST_BYTES:
+            raise DivisionError(
+                f"{scenario.name}: its files have more than {_MOST_BYTES / 1e6:.0f} MB, too much "
+                "for other machines"
+            )
+        found[name] = path.read_bytes()
+    return found
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, or no path at all
+        return False
+
+
+def _is_inner(name: str) -> bool:
+    path = PurePosixPath(name)
+    return bool(name) and not (path.is_absolute() or ".." in path.parts)
+
+
+def _nodes(content: dict[str, Any]) -> Iterator[str]:
+    """Yields the nodes that a scenario names."""
+    for kind in content.get("types", {}).values():
+        yield from (entry["node"] for entry in kind.get("nodes", ()))
+    yield from (entry["node"] for entry in content.get("nodes", ()))
+
+
+def _texts(data: Any) -> Iterator[str]:
+    """Yields all strings in plain data."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict):
+        for value in data.values():
+            yield from _texts(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from _texts(value)

@@ -1,0 +1,94 @@
+"""`volery worker`: joins the leader of a divided run and serves its part to the end."""
+
+from __future__ import annotations
+
+import socket
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from volery.cluster.division.job import DivisionJob
+from volery.cluster.division.link import Link, apply_to
+from volery.cluster.division.worker import RunEndedError, Worker
+from volery.cluster.runs import code_version
+from volery.core.errors import DivisionError, VoleryError, reason_of
+from volery.core.machine import describe_versions
+from volery.runtime.simulation import Simulation
+
+_RETRY_S = 0.5
+
+
+def serve_leader(
+    address: tuple[str, int],
+    token: str,
+    *,
+    threads: int,
+    trust: bool,
+    wait_s: float,
+    tell: Callable[[str], None],
+) -> str:
+    """Joins the leader at `address` and serves it; returns why the run ended.
+
+    trust: whether code that the leader names may run from this machine's working folder. wait_s:
+    wall time within which the leader must listen. Raises `DivisionError` if it refuses this worker
+    or is lost, any `VoleryError` that ends this part of the run.
+    """
+    link = Link(_connected(address, wait_s), "the leader")
+    try:
+        apply_to(link, token, {"volery's code": code_version(), **describe_versions()})
+        link.show_life()
+        kind, *rest = link.receive()
+        if kind == "end":
+            return str(rest[0])
+        if kind != "job":
+            raise DivisionError("the leader sends no part of a run")
+        job = DivisionJob(**rest[0])
+        tell(f"joined: serves {len(job.uavs)} UAVs")
+        with tempfile.TemporaryDirectory(prefix="volery_") as place:
+            try:
+                return _flown(job, Path(place), link, threads=threads, trust=trust)
+            except RunEndedError as error:
+                return str(error)
+            except Exception as error:
+                _report(link, error)
+                raise
+    finally:
+        link.close()
+
+
+def _flown(job: DivisionJob, place: Path, link: Link, *, threads: int, trust: bool) -> str:
+    scenario = job.scenario(place, trust=trust)
+    with Simulation(scenario, threads=threads, share=job.share) as simulation:
+
+        def connect(parts: object) -> Worker:
+            worker = Worker(parts, link, job.repeated)  # type: ignore[arg-type]
+            worker.greet()
+            return worker
+
+        simulation.divide(connect)
+        simulation.follow()
+    return "the run has ended"
+
+
+def _connected(address: tuple[str, int], wait_s: float) -> socket.socket:
+    until = time.monotonic() + wait_s
+    while True:
+        try:
+            return socket.create_connection(address, 5.0)
+        except (OSError, OverflowError) as error:
+            if time.monotonic() >= until:
+                raise DivisionError(
+                    f"--join {address[0]}:{address[1]}: no leader there ({reason_of(error)}); "
+                    "start it: volery run SCENARIO --workers N --listen HOST:PORT"
+                ) from None
+            time.sleep(_RETRY_S)
+
+
+def _report(link: Link, error: Exception) -> None:
+    """Tells the leader why this part of the run has failed."""
+    text = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
+    try:
+        link.send("failed", text)
+    except DivisionError:
+        return  # the leader is lost

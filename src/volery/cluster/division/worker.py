@@ -1,0 +1,87 @@
+"""A worker's end of a divided run: it follows the leader, tick by tick."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.cluster.division.exchange import Inbox, Outbox, state_hash
+from volery.cluster.division.link import Link, LinkError
+from volery.core.errors import VoleryError
+from volery.runtime.division_parts import DivisionParts
+
+_FAR = 1 << 62
+
+
+class RunEndedError(VoleryError):
+    """The leader has ended the run."""
+
+
+class Worker:
+    """Implements an engine's `Division` on a worker.
+
+    repeated: number of the leader's frames that a lost worker has answered already.
+    """
+
+    def __init__(self, parts: DivisionParts, link: Link, repeated: int = 0) -> None:
+        self._engine, self._graph = parts.engine, parts.graph
+        self._nodes = parts.nodes
+        self._link = link
+        self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
+        self._left_to_repeat = repeated
+        self._told: dict[str, Any] = {}
+        self._seen_changes = -1
+
+    def greet(self) -> None:
+        """Sends what the leader must know before the first tick."""
+        self._link.send("ready", self._due(), self._news())
+
+    def begin_tick(self, last_step: int) -> int:
+        """Takes over what has happened elsewhere; returns the step that the leader sets.
+
+        Raises `RunEndedError` when the leader ends the run.
+        """
+        while True:
+            kind, *rest = self._link.receive()
+            if kind == "end":
+                raise RunEndedError(str(rest[0]))
+            if kind != "t" or len(rest) != 4:
+                raise LinkError(f"{self._link.name} sends a broken frame")
+            items, final, end, wishes = rest
+            self._left_to_repeat = max(0, self._left_to_repeat - 1)
+            if wishes is not None:
+                self._outbox.wanted = frozenset(wishes[0])
+                self._outbox.declared = frozenset(self._told.get("topics", ()))
+                self._outbox.show_externally(wishes[1])
+            self._inbox.apply(items)
+            if final:
+                return min(int(end), last_step)
+            self.end_tick()
+
+    def end_tick(self) -> None:
+        """Sends what has been published here, unless a lost worker has done so."""
+        items = self._outbox.flush()
+        if not self._left_to_repeat:
+            self._link.send("b", items, self._due(), state_hash(self._engine.fleet), self._news())
+
+    def end_round(self) -> None:
+        """Does nothing: a worker has no clients."""
+
+    def _due(self) -> int:
+        """Returns the step at which something is due here."""
+        return self._engine.horizon(_FAR)
+
+    def _news(self) -> dict[str, Any]:
+        """Returns the topics published and needed here, if they have changed."""
+        if self._graph.changes == self._seen_changes:
+            return {}
+        self._seen_changes = self._graph.changes
+        reacts = frozenset().union(*(node.endpoints().subscribes for node in self._nodes()))
+        found = {
+            "topics": {name: list(of) for name, of in self._graph.local_topics().items()},
+            "subscribed": sorted(self._graph.subscribed_topics()),
+            "reacts": sorted(reacts),
+        }
+        if found == self._told:
+            return {}
+        self._told = found
+        return found

@@ -1,0 +1,264 @@
+"""The leader's workers: processes that it starts here, or machines that join it."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from volery.cluster.division.job import DivisionJob, files_of
+from volery.cluster.division.leader import Leader, Member
+from volery.cluster.division.link import Link, LinkError, admit
+from volery.cluster.division.partition import divided
+from volery.cluster.runs import code_version
+from volery.core.errors import DivisionError, reason_of
+from volery.core.machine import describe_versions, usable_cores
+from volery.engine.engine import Division
+from volery.runtime.build.share import Share
+from volery.runtime.division_parts import DivisionParts
+from volery.scenario.schema import Scenario
+
+_GLANCE_S = 0.2
+_START_S = 120.0
+"""Wall time within which a worker that was started here must join, s."""
+_FAREWELL_S = 5.0
+_LOG_LINES = 3
+_THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
+TOKEN_VARIABLE = "VOLERY_TOKEN"
+
+
+@dataclass(frozen=True)
+class DivisionOptions:
+    """How a run is divided."""
+
+    workers: int
+    """Number of workers besides the leader."""
+    listen: tuple[str, int] | None = None
+    """Host and port at which workers of other machines join; None: they are started here."""
+    token: str | None = None
+    """What workers must know; None: made up, for workers that are started here."""
+    drop: bool = False
+    """Whether the run goes on without the nodes and sensors of a lost worker."""
+    trust: bool = False
+    """Whether nodes from the scenario's folder may run."""
+
+
+class Workers:
+    """Workers of one run. Use it as a context manager.
+
+    tell: shows a line to the user. is_stopped: returns whether to stop waiting for workers.
+    """
+
+    def __init__(
+        self,
+        options: DivisionOptions,
+        scenario: Scenario,
+        tell: Callable[[str], None],
+        is_stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._options, self._scenario, self._tell = options, scenario, tell
+        self._is_stopped = is_stopped
+        self._token = options.token or secrets.token_urlsafe(24)
+        self._versions = {"volery's code": code_version(), **describe_versions()}
+        host, port = options.listen or ("127.0.0.1", 0)
+        self._listener = _listener(host, port)
+        self._started: list[_LocalWorker] = []
+        self._members: list[Member] = []
+        self._leader: Leader | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close("the run has ended")
+
+    @property
+    def address(self) -> str:
+        """Address at which workers join, `HOST:PORT`."""
+        host, port = self._listener.getsockname()[:2]
+        return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+    def gather(self) -> Share:
+        """Waits for all workers and hands out their parts; returns the leader's share.
+
+        Raises `DivisionError` for a scenario that cannot be divided.
+        """
+        shares = divided(self._scenario, self._options.workers + 1)
+        links = self._start() if self._options.listen is None else self._await_others()
+        self._members = [Member(*pair) for pair in zip(links, shares[1:], strict=True)]
+        for member in self._members:
+            self._hand_out(member)
+        return Share(named=frozenset().union(*shares[1:]))
+
+    def connect(self, parts: DivisionParts) -> Division:
+        """Waits until all workers are ready; returns the connection of the leader to them."""
+        for member in self._members:
+            _take_greeting(member)
+        self._leader = Leader(parts, self._members, self._substitute)
+        return self._leader
+
+    def close(self, reason: str) -> None:
+        """Ends the workers' parts, and the processes that were started here."""
+        self._listener.close()
+        if self._leader is not None:
+            self._leader.close(reason)
+        for member in self._members:
+            member.close()
+        for worker in self._started:
+            worker.close()
+
+    # ------------------------------------------------------------------------------------- inside
+
+    def _start(self) -> list[Link]:
+        threads = max(1, usable_cores() // (self._options.workers + 1))
+        return [self._started_here(threads) for _ in range(self._options.workers)]
+
+    def _await_others(self) -> list[Link]:
+        count = self._options.workers
+        self._tell(f"waiting for {count} workers: volery worker --join {self.address}")
+        links: list[Link] = []
+        while len(links) < count:
+            link = self._admitted(f"worker {len(links) + 1}")
+            if link is not None:
+                links.append(link)
+                self._tell(f"{link.name} has joined")
+            if self._is_stopped():
+                raise DivisionError("stopped while waiting for workers")
+        return links
+
+    def _started_here(self, threads: int) -> Link:
+        """Starts a worker on this machine and waits until it has joined."""
+        number = len(self._started) + 1
+        worker = _LocalWorker(self.address, self._token, threads, trust=self._options.trust)
+        self._started.append(worker)
+        until = time.monotonic() + _START_S
+        while time.monotonic() < until and not self._is_stopped():
+            link = self._admitted(f"worker {number}", pid=worker.pid)
+            if link is not None:
+                return link
+            if ending := worker.how_it_ended():
+                raise DivisionError(f"worker {number} {ending}")
+        raise DivisionError(f"worker {number} has not joined within {_START_S:.0f} s")
+
+    def _admitted(self, name: str, pid: int | None = None) -> Link | None:
+        """Returns the next worker that joins within a moment."""
+        try:
+            connection, address = self._listener.accept()
+        except TimeoutError:
+            return None
+        shown = name if pid is not None else f"{name} ({address[0]})"
+        link = Link(connection, shown)
+        try:
+            admit(link, self._token, self._versions)
+        except LinkError as error:
+            self._tell(str(error))
+            link.close()
+            return None
+        link.show_life()
+        return link
+
+    def _hand_out(self, member: Member, repeated: int = 0, *, is_here: bool | None = None) -> None:
+        here = self._options.listen is None if is_here is None else is_here
+        access = self._scenario.access
+        folder = str((access.folder or Path()).resolve()) if here else ""
+        job = DivisionJob(
+            self._scenario.model_dump(exclude_unset=True, mode="json"),
+            folder,
+            {} if here else files_of(self._scenario),
+            tuple(sorted(member.uavs)),
+            repeated,
+        )
+        member.link.send("job", asdict(job))
+
+    def _substitute(self, lost: Member, reason: str) -> Link | None:
+        """Has the part of a lost worker repeated here; see `leader.Substitute`."""
+        if self._options.drop:
+            self._tell(f"{reason}; {_listed(lost.uavs)} go on without their nodes and sensors")
+            return None
+        self._tell(f"{reason}; this machine repeats its part so far and takes it over")
+        start = time.monotonic()
+        link = self._started_here(threads=1)
+        stand_in = Member(link, lost.uavs)
+        self._hand_out(stand_in, lost.num_sent, is_here=True)
+        _take_greeting(stand_in)
+        for frame in lost.history():
+            link.send_bytes(frame)
+        self._tell(f"{_listed(lost.uavs)}: taken over after {time.monotonic() - start:.1f} s")
+        return link
+
+
+class _LocalWorker:
+    """A worker process on this machine."""
+
+    def __init__(self, address: str, token: str, threads: int, *, trust: bool) -> None:
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
+        single = {f"{name}_NUM_THREADS": str(threads) for name in _THREADS}
+        command = [sys.executable, "-P", "-m", "volery", "worker", "--join", address]
+        command += ["--threads", str(threads), *(["--trust"] if trust else [])]
+        try:
+            self._process = subprocess.Popen(
+                command,
+                env={**os.environ, **single, TOKEN_VARIABLE: token},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=self._log,
+                start_new_session=True,  # Ctrl-C is the leader's
+            )
+        except OSError as error:
+            raise DivisionError(f"a worker cannot start: {reason_of(error)}") from None
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    def how_it_ended(self) -> str:
+        """Returns how the process ended, as text; empty: it runs."""
+        code = self._process.poll()
+        if code is None:
+            return ""
+        self._log.seek(0)
+        lines = self._log.read().decode(errors="replace").splitlines()[-_LOG_LINES:]
+        return f"ended with exit code {code}: {' | '.join(lines)}"
+
+    def close(self) -> None:
+        """Ends the process."""
+        try:
+            self._process.wait(_FAREWELL_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._log.close()
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        listener = socket.create_server((host, port), family=family)
+    except (OSError, OverflowError) as error:
+        raise DivisionError(f"--listen {host}:{port}: {reason_of(error)}") from None
+    listener.settimeout(_GLANCE_S)
+    return listener
+
+
+def _take_greeting(member: Member) -> None:
+    """Takes over what a worker that is ready tells of itself. Raises `DivisionError`."""
+    frame: list[Any] = member.link.receive()
+    if frame[0] == "failed":
+        raise DivisionError(f"{member.link.name}: {frame[1]}")
+    if frame[0] != "ready" or len(frame) != 3:
+        raise LinkError(f"{member.link.name} sends a broken frame")
+    member.heard(frame[1], frame[2])
+
+
+def _listed(uavs: frozenset[str]) -> str:
+    names = sorted(uavs, key=lambda name: (len(name), name))
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
