@@ -129,7 +129,7 @@ class Graph:
         self.sender: Publisher | None = None
         """Publisher of the message that is being delivered; None: none is."""
         self.changes = 0
-        """Number of changes of subscriptions so far."""
+        """Number of changes of publishers and subscriptions so far."""
         self._members = threading.RLock()
         """Guards changes of topics, publishers, subscribers and services."""
 
@@ -175,6 +175,7 @@ class Graph:
         with self._members:
             found = self._decided_topic(topic, msgtype)
             found.publishers += 1
+            self.changes += 1
             found.num_local += local
             found.latched = found.latched or latched
         return Publisher(self, found, latched=latched, local=local)
@@ -183,6 +184,7 @@ class Graph:
         """Removes a publisher; used by `Publisher`."""
         with self._members:
             topic.publishers -= 1
+            self.changes += 1
             topic.num_local -= publisher.local
             topic.last_messages.pop(publisher, None)
             self._drop_unused(topic)
@@ -280,11 +282,6 @@ class Graph:
         """Returns type and latching of the topics with a publisher that only this machine has."""
         with self._members:
             return {t.name: (t.msgtype, t.latched) for t in self._topics.values() if t.num_local}
-
-    def has_local_publisher(self, topic: str) -> bool:
-        """Returns whether a publisher of the topic exists on this machine of a divided run only."""
-        found = self._topics.get(topic)
-        return found is not None and found.num_local > 0
 
     def subscribed_topics(self) -> list[str]:
         """Returns the names of the topics with subscribers."""

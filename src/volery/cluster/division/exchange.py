@@ -24,6 +24,8 @@ from volery.graph.session import ClientCommand
 from volery.graph.topics import Publisher, Subscription
 from volery.runtime.division_parts import DivisionParts
 
+_HASHED_TICKS = 32
+
 Item = list[Any]
 """An item: its kind and what belongs to it."""
 MESSAGE, EXTERNAL, CALL, COMMAND, ROUND = "m", "e", "s", "k", "r"
@@ -38,12 +40,21 @@ class Outbox:
         self._graph = graph
         self._items: list[Item] = []
         self._attached: dict[str, Subscription] = {}
-        self.wanted: Collection[str] = frozenset()
-        """Topics with subscribers on other machines."""
-        self.declared: Collection[str] = frozenset()
-        """Topics whose subscribers on other machines are known."""
+        self._wanted: Collection[str] = frozenset()
+        self._declared: Collection[str] | None = frozenset()
+        self._matching: frozenset[str] = frozenset()
+        self._seen_changes = -1
         self._tap = graph.subscribe_all(self._take, self._is_wanted)
         graph.on_node_call = self._call
+
+    def want(self, wanted: Collection[str], declared: Collection[str] | None = None) -> None:
+        """Collects messages on the topics `wanted`, which have subscribers on other machines.
+
+        declared: topics whose subscribers are known; messages on others are collected, too. None:
+        those on all topics are.
+        """
+        self._wanted, self._declared = wanted, declared
+        self._seen_changes = -1
 
     def flush(self) -> list[Item]:
         """Returns the items since the last call."""
@@ -73,9 +84,15 @@ class Outbox:
                 self._attached[topic] = self._graph.attach(topic, self._take_external, msgtype)
 
     def _is_wanted(self, topic: str) -> bool:
-        if topic in self.wanted or topic not in self.declared:
-            return self._graph.has_local_publisher(topic)
-        return False
+        if self._graph.changes != self._seen_changes:
+            self._seen_changes = self._graph.changes
+            known, wanted = self._declared, self._wanted
+            self._matching = frozenset(
+                name
+                for name in self._graph.local_topics()
+                if name in wanted or (known is not None and name not in known)
+            )
+        return topic in self._matching
 
     def _take(self, published: Published) -> None:
         sender = self._graph.sender
@@ -147,8 +164,10 @@ class Inbox:
         self._graph.deliver()
 
 
-def state_hash(fleet: Fleet) -> bytes:
-    """Returns a hash of all positions, attitudes and velocities."""
+def state_hash(fleet: Fleet, tick: int) -> bytes:
+    """Returns a hash of all positions, attitudes and velocities; empty in most ticks."""
+    if tick % _HASHED_TICKS:
+        return b""
     state = fleet.state
     digest = hashlib.blake2b(digest_size=8)
     for array in (state.position_map, state.attitude, state.velocity_map):

@@ -98,10 +98,10 @@ class Leader:
         self._substitute = substitute
         self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
         self._seen_changes = -1
+        self._exchanges = 0
         parts.commands.on_noted = self._outbox.command
         for member in self._members:
             self._inbox.declare(member.topics)
-        self._outbox.declared = _All()
         self._note_wishes()
 
     def begin_tick(self, last_step: int) -> int:
@@ -121,7 +121,8 @@ class Leader:
 
     def end_tick(self) -> None:
         """Receives and applies what the workers have published."""
-        own_hash = state_hash(self._engine.fleet)
+        own_hash = state_hash(self._engine.fleet, self._exchanges)
+        self._exchanges += 1
         for member in tuple(self._members):
             frame = self._reach(member, self._batch_of)
             if frame is None:
@@ -205,19 +206,26 @@ class Leader:
 
     def _note_wishes(self) -> None:
         """Collects what workers need."""
-        self._outbox.wanted = frozenset().union(*(m.subscribed for m in self._members))
+        self._outbox.want(frozenset().union(*(m.subscribed for m in self._members)))
         self._seen_changes = -1
+
+
+def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
+    """Waits until a worker is ready; returns what it tells of itself: see `Member.heard`.
+
+    Raises `DivisionError` if its part cannot start.
+    """
+    kind, *rest = link.receive()
+    if kind == "failed":
+        raise _FailedError(f"{link.name}: {rest[0]}")
+    if kind != "ready" or len(rest) != 2:
+        raise LinkError(f"{link.name} sends a broken frame")
+    due, news = rest
+    return int(due), news
 
 
 class _FailedError(DivisionError):
     """A worker's part of the run has failed, as it would have here."""
-
-
-class _All(frozenset[str]):
-    """Contains every topic."""
-
-    def __contains__(self, _topic: object) -> bool:
-        return True
 
 
 def _send(frame: Frame, member: Member) -> None:

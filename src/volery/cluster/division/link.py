@@ -42,7 +42,8 @@ class Link:
         self.name = name
         self._socket = connection
         connection.settimeout(SILENCE_S)
-        tend(connection)
+        if connection.family != socket.AF_UNIX:
+            tend(connection)
         self._max_bytes = _MAX_GREETING_BYTES
         self._sending = threading.Lock()
         self._closed = threading.Event()

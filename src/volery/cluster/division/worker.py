@@ -30,6 +30,7 @@ class Worker:
         self._left_to_repeat = repeated
         self._told: dict[str, Any] = {}
         self._seen_changes = -1
+        self._exchanges = 0
 
     def greet(self) -> None:
         """Sends what the leader must know before the first tick."""
@@ -49,8 +50,7 @@ class Worker:
             items, final, end, wishes = rest
             self._left_to_repeat = max(0, self._left_to_repeat - 1)
             if wishes is not None:
-                self._outbox.wanted = frozenset(wishes[0])
-                self._outbox.declared = frozenset(self._told.get("topics", ()))
+                self._outbox.want(frozenset(wishes[0]), frozenset(self._told.get("topics", ())))
                 self._outbox.show_externally(wishes[1])
             self._inbox.apply(items)
             if final:
@@ -60,8 +60,10 @@ class Worker:
     def end_tick(self) -> None:
         """Sends what has been published here, unless a lost worker has done so."""
         items = self._outbox.flush()
+        own_hash = state_hash(self._engine.fleet, self._exchanges)
+        self._exchanges += 1
         if not self._left_to_repeat:
-            self._link.send("b", items, self._due(), state_hash(self._engine.fleet), self._news())
+            self._link.send("b", items, self._due(), own_hash, self._news())
 
     def end_round(self) -> None:
         """Does nothing: a worker has no clients."""

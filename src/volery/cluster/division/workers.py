@@ -12,10 +12,9 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from volery.cluster.division.job import DivisionJob, files_of
-from volery.cluster.division.leader import Leader, Member
+from volery.cluster.division.leader import Leader, Member, greeting_of
 from volery.cluster.division.link import Link, LinkError, admit
 from volery.cluster.division.partition import divided
 from volery.cluster.runs import code_version
@@ -95,13 +94,13 @@ class Workers:
         links = self._start() if self._options.listen is None else self._await_others()
         self._members = [Member(*pair) for pair in zip(links, shares[1:], strict=True)]
         for member in self._members:
-            self._hand_out(member)
+            self._hand_out(member.link, member.uavs, is_here=self._options.listen is None)
         return Share(named=frozenset().union(*shares[1:]))
 
     def connect(self, parts: DivisionParts) -> Division:
         """Waits until all workers are ready; returns the connection of the leader to them."""
         for member in self._members:
-            _take_greeting(member)
+            member.heard(*greeting_of(member.link))
         self._leader = Leader(parts, self._members, self._substitute)
         return self._leader
 
@@ -165,18 +164,20 @@ class Workers:
         link.show_life()
         return link
 
-    def _hand_out(self, member: Member, repeated: int = 0, *, is_here: bool | None = None) -> None:
-        here = self._options.listen is None if is_here is None else is_here
+    def _hand_out(
+        self, link: Link, uavs: frozenset[str], repeated: int = 0, *, is_here: bool
+    ) -> None:
+        """Sends a worker its part."""
         access = self._scenario.access
-        folder = str((access.folder or Path()).resolve()) if here else ""
+        folder = str((access.folder or Path()).resolve()) if is_here else ""
         job = DivisionJob(
             self._scenario.model_dump(exclude_unset=True, mode="json"),
             folder,
-            {} if here else files_of(self._scenario),
-            tuple(sorted(member.uavs)),
+            {} if is_here else files_of(self._scenario),
+            tuple(sorted(uavs)),
             repeated,
         )
-        member.link.send("job", asdict(job))
+        link.send("job", asdict(job))
 
     def _substitute(self, lost: Member, reason: str) -> Link | None:
         """Has the part of a lost worker repeated here; see `leader.Substitute`."""
@@ -186,9 +187,8 @@ class Workers:
         self._tell(f"{reason}; this machine repeats its part so far and takes it over")
         start = time.monotonic()
         link = self._started_here(threads=1)
-        stand_in = Member(link, lost.uavs)
-        self._hand_out(stand_in, lost.num_sent, is_here=True)
-        _take_greeting(stand_in)
+        self._hand_out(link, lost.uavs, lost.num_sent, is_here=True)
+        greeting_of(link)
         for frame in lost.history():
             link.send_bytes(frame)
         self._tell(f"{_listed(lost.uavs)}: taken over after {time.monotonic() - start:.1f} s")
@@ -247,16 +247,6 @@ def _listener(host: str, port: int) -> socket.socket:
         raise DivisionError(f"--listen {host}:{port}: {reason_of(error)}") from None
     listener.settimeout(_GLANCE_S)
     return listener
-
-
-def _take_greeting(member: Member) -> None:
-    """Takes over what a worker that is ready tells of itself. Raises `DivisionError`."""
-    frame: list[Any] = member.link.receive()
-    if frame[0] == "failed":
-        raise DivisionError(f"{member.link.name}: {frame[1]}")
-    if frame[0] != "ready" or len(frame) != 3:
-        raise LinkError(f"{member.link.name} sends a broken frame")
-    member.heard(frame[1], frame[2])
 
 
 def _listed(uavs: frozenset[str]) -> str:

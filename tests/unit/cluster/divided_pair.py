@@ -1,0 +1,145 @@
+"""A divided run whose worker is a thread of this process, and nodes that it flies."""
+
+import contextlib
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from volery.cluster.division.leader import Leader, Member, greeting_of
+from volery.cluster.division.link import Link
+from volery.cluster.division.partition import divided
+from volery.cluster.division.worker import RunEndedError, Worker
+from volery.core.errors import VoleryError
+from volery.graph.messages import LaserScan, Odometry, String, Twist, Vector3
+from volery.graph.nodes.node import Node
+from volery.runtime import Simulation
+from volery.runtime.build.share import Share
+from volery.scenario.load import parse_scenario
+
+HERE = Path(__file__).stem
+
+
+class Weaver(Node):
+    """Flies by what its LIDAR sees of the other UAVs, and lands after `lands_after_s`."""
+
+    def __init__(self):
+        super().__init__("weaver")
+        self.declare_parameter("lands_after_s", 1e9)
+        self.declare_parameter("fails_after_s", 1e9)
+        self.seen = 0.0
+        self.commands = self.create_publisher(Twist, "cmd_vel", 10)
+        self.words = self.create_publisher(String, "words", latched=True)
+        self.landing = self.create_client("std_srvs/srv/Trigger", "land")
+        self.create_subscription(LaserScan, "laser/horizontal/scan", self.on_scan, 5)
+        self.create_subscription(Odometry, "odom", self.on_odometry, 5)
+        self.create_subscription(String, "orders", self.on_order, 5)
+        self.words.publish(String("hello"))
+        self.ordered = 0.0
+
+    def on_scan(self, scan):
+        finite = scan.ranges[np.isfinite(scan.ranges)]
+        self.seen = float(finite.sum()) if len(finite) else 0.0
+
+    def on_order(self, order):
+        self.ordered = float(order.data)
+
+    def on_odometry(self, odometry):
+        now_s = odometry.header.stamp.sec + odometry.header.stamp.nanosec * 1e-9
+        if now_s > self.get_parameter("fails_after_s").value:
+            raise ValueError("the propeller of thought broke")
+        if now_s > self.get_parameter("lands_after_s").value:
+            self.landing.call_async()
+            return
+        speed = 0.3 * np.sin(0.1 * self.seen) + self.ordered
+        self.commands.publish(Twist(Vector3(speed, 0.1, 0.0), Vector3(0.0, 0.0, 0.2)))
+
+
+def scenario_of(count=3, **parameters):
+    """Returns a scenario of `count` UAVs that see each other."""
+    lidar = {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]}
+    sensors = [lidar, {"kind": "imu"}, {"kind": "odometry"}]
+    node = {"node": f"{HERE}:Weaver", "parameters": parameters}
+    row = {"type": "weaver", "count": count, "position_m": [0.0, 0.0]}
+    row |= {"last_position_m": [3.0 * (count - 1), 0.0]}
+    flight = {"take_off_altitude_m": 0.6}
+    return parse_scenario(
+        {
+            "name": "weaving",
+            "types": {"weaver": {"flight": flight, "sensors": sensors, "nodes": [node]}},
+            "uavs": [row],
+        }
+    )
+
+
+class DividedPair:
+    """The leader's simulation, `simulation`, and a worker in a thread."""
+
+    def __init__(self, scenario, *, on_loss=None):
+        self.scenario = scenario
+        self.shares = divided(scenario, 2)
+        self.endings = []
+        self.on_loss = on_loss or (lambda _member, reason: self.fail(reason))
+        self._threads = []
+
+    def __enter__(self):
+        link = self.start_worker()
+        self.simulation = Simulation(
+            self.scenario, threads=1, share=Share(named=self.shares[1])
+        ).__enter__()
+        self.member = Member(link, self.shares[1])
+        self.member.heard(*greeting_of(link))
+        self.simulation.divide(lambda parts: Leader(parts, [self.member], self.on_loss))
+        self.division = self.simulation._engine.division
+        return self
+
+    def __exit__(self, *_exception):
+        self.division.close("the test is over")
+        self.simulation.close()
+        for thread in self._threads:
+            thread.join(60.0)
+            assert not thread.is_alive()
+
+    def start_worker(self, repeated=0):
+        """Starts a worker; returns the leader's link to it."""
+        ends = socket.socketpair()
+        ours, theirs = Link(ends[0], "worker 1"), Link(ends[1], "the leader")
+        ours.show_life()
+        theirs.show_life()
+        thread = threading.Thread(target=self._serve, args=(theirs, repeated), daemon=True)
+        self._threads.append(thread)
+        thread.start()
+        return ours
+
+    def substitute(self, lost, _reason):
+        """Has another worker repeat the part of a lost one."""
+        link = self.start_worker(lost.num_sent)
+        greeting_of(link)
+        for frame in lost.history():
+            link.send_bytes(frame)
+        return link
+
+    def fail(self, reason):
+        raise AssertionError(reason)
+
+    def _serve(self, link, repeated):
+        share = Share(is_leader=False, named=self.shares[1])
+        try:
+            with Simulation(self.scenario, threads=1, share=share) as simulation:
+                self.worker = simulation
+
+                def connect(parts):
+                    worker = Worker(parts, link, repeated)
+                    worker.greet()
+                    return worker
+
+                simulation.divide(connect)
+                simulation.follow()
+        except RunEndedError as error:
+            self.endings.append(str(error))
+        except VoleryError as error:
+            with contextlib.suppress(VoleryError):
+                link.send("failed", str(error))
+        finally:
+            link.close()
