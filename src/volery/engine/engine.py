@@ -74,14 +74,19 @@ class Sink(Protocol):
 class Division(Protocol):
     """Keeps the machines of a divided run in lock step; each has an engine of its own."""
 
-    def begin_tick(self, last_step: int) -> int:
-        """Takes over what other machines have published; returns the step at which the tick ends.
+    @property
+    def meets(self) -> bool:
+        """Whether all machines are at the present step, so that commands may be executed."""
 
-        last_step: where it ends at the latest.
+    def begin_tick(self, last_step: int) -> int:
+        """Takes over what others have published, where the machines meet.
+
+        last_step: the step at which the tick ends at the latest. Returns that of the next meeting,
+        if it is earlier.
         """
 
     def end_tick(self) -> None:
-        """Passes on what this machine has published in the tick."""
+        """Passes on what this machine has published, where the machines meet."""
 
     def end_round(self) -> None:
         """Called when the effects of some commands of clients have been delivered."""
@@ -130,6 +135,8 @@ class Engine:
         """Whether the state is consistent, so that it can be saved and restored."""
         self.dt_ns = fleet.dt_ns
         self._new_events: list[Event] = []
+        self.num_events = 0
+        """Number of events that `collect_events` has returned so far."""
         self.names = names
         """Names of the UAVs, in fleet order."""
         self._response = CRASH if crash_on_contact else BOUNCE
@@ -302,6 +309,7 @@ class Engine:
         self._new_events += event_collection.drain(self.fleet, self.names)
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
+        self.num_events += len(events)
         return events
 
     def restart_sensors(

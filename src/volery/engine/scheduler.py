@@ -78,6 +78,11 @@ class Scheduler(Generic[What]):
         steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
         return min(steps, default=None)
 
+    def next_step_of(self, chosen: Callable[[What], bool]) -> int | None:
+        """Returns the step of the next firing of the chosen entries, None without one."""
+        steps = (e.due_step for e in self._heap if chosen(e.what) and (not e.wanted or e.wanted()))
+        return min(steps, default=None)
+
     def pop_due(self, step: int) -> list[DueTask[What]]:
         """Returns all firings due at or before `step`, in order, and schedules the next ones."""
         due = []

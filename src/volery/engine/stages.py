@@ -30,12 +30,14 @@ def take_commands(engine: Engine, tick: Tick) -> None:
     """Executes the commands of other threads since the last tick, in order of arrival.
 
     The state is consistent here, so an action may restore an earlier state. Publications are
-    delivered at once, so that they affect the physics steps of this tick. In a divided run, the
-    machines then agree on the end of the tick.
+    delivered at once, so that they affect the physics steps of this tick. In a divided run, this
+    waits until the machines meet.
     """
-    engine.process_commands()
-    if engine.division is not None:
-        tick.last_step = engine.division.begin_tick(tick.last_step)
+    division = engine.division
+    if division is None or division.meets:
+        engine.process_commands()
+    if division is not None:
+        tick.last_step = division.begin_tick(tick.last_step)
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:

@@ -351,9 +351,11 @@ class Graph:
             with self._members:  # a client that attaches meanwhile receives the message once
                 if sender.is_latching:
                     topic.last_messages[sender] = published
-                recorders = [c for c in self._to_all if c.matches(topic.name)]
+                if topic.seen_changes != self.changes:
+                    topic.seen_changes = self.changes
+                    topic.recorders = tuple(c for c in self._to_all if c.matches(topic.name))
                 callbacks = tuple(topic.callbacks)
-            for listener in recorders:
+            for listener in topic.recorders:
                 listener(published)
             if client:
                 self._deliver_for_client(client, callbacks, published)

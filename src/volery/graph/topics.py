@@ -32,6 +32,8 @@ class Topic:
         self.name = name
         self.msgtype = msgtype
         self.callbacks: list[Callback] = []
+        self.recorders: tuple[Callback, ...] = ()  # those of the graph that receive the topic, ...
+        self.seen_changes = -1  # ... at this number of the graph's changes
         self.external: list[Callback] = []  # the callbacks that other threads have attached
         self.on_ended: list[Callable[[str], None]] = []  # learn why external subscriptions end
         self.num_attached = 0  # number of external subscriptions so far
@@ -62,6 +64,9 @@ class Topic:
 class _Delivery(Protocol):
     """Delivers the messages of publishers: a graph."""
 
+    changes: int
+    """Number of changes of publishers and subscriptions so far."""
+
     def is_recorded(self, topic: str) -> bool:
         """Returns whether a recorder or digest receives the messages of a topic."""
 
@@ -86,6 +91,7 @@ class Publisher:
         self.latched = latched
         self.local = local
         """Whether only this machine of a divided run has the publisher; see `Graph.advertise`."""
+        self._seen_changes, self._is_heard = -1, False
         self.owner = ""
         """Full name of the publisher's node; empty: none."""
         self.lasting = False
@@ -109,9 +115,12 @@ class Publisher:
     @property
     def has_subscribers(self) -> bool:
         """Whether a message would be delivered or latched; otherwise it need not be built."""
-        return bool(
-            self.latched or self._topic.callbacks or self._graph.is_recorded(self._topic.name)
-        )
+        changes = self._graph.changes
+        if changes != self._seen_changes:
+            topic = self._topic
+            self._is_heard = bool(topic.callbacks or self._graph.is_recorded(topic.name))
+            self._seen_changes = changes
+        return self.latched or self._is_heard
 
     def publish(self, message: Any) -> None:
         """Queues a message for delivery; has no effect after `cancel`."""

@@ -86,8 +86,11 @@ class CameraPublisher:
         self._outlets: dict[str, list[_Outlet]] = {}
         self._pixels: dict[str, int] = {}
 
-    def announce(self, camera: Camera, *, local: bool) -> None:
-        """Advertises a camera's topics; local: in a divided run, this machine samples it."""
+    def announce(self, camera: Camera, *, local: bool) -> list[Publisher]:
+        """Advertises a camera's topics, and returns their publishers.
+
+        local: in a divided run, this machine samples the camera.
+        """
         sensor = camera.sensor
         self._cameras[sensor.path] = camera
         outlets = self._outlets[sensor.path] = []
@@ -96,6 +99,7 @@ class CameraPublisher:
                 name = f"/{sensor.path}{topic.suffix}"
                 publisher = self._graph.advertise(name, topic.message_class, local=local)
                 outlets.append(_Outlet(publisher, topic.message, parts))
+        return [outlet.publisher for outlet in outlets]
 
     def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:
         """Sets the number of pixels of these cameras' images."""

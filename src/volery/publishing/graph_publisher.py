@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,15 @@ _UNKNOWN_ORIENTATION[0] = -1.0
 for _shared in (_NO_EFFORT, _UNKNOWN_ORIENTATION):
     _shared.flags.writeable = False
 _IDENTITY = Quaternion(0.0, 0.0, 0.0, 1.0)
+_MOST_CACHED = 1000
+
+
+class _Heard(NamedTuple):
+    """The sensors of some samples that have subscribers, until subscriptions change."""
+
+    changes: int
+    sensors: Sequence[SensorId]
+    rows: list[int]
 
 
 class GraphPublisher:
@@ -80,6 +89,9 @@ class GraphPublisher:
         self.cameras = CameraPublisher(graph)
         """Publisher of the cameras; returns which parts of images have subscribers."""
         self._mounts: dict[str, Mount] = {}
+        self._of_sensor: dict[str, list[Publisher]] = {}
+        """Publishers of each sensor, by its path."""
+        self._heard: dict[int, _Heard] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
         self._tf_static = graph.advertise("/tf_static", TFMessage, latched=True)
@@ -106,14 +118,14 @@ class GraphPublisher:
         self._mounts[sensor.path] = mount
         base = f"{sensor.uav_name}/base_link"
         if kind is JointAngles:
-            self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
+            self._advertise(f"/{sensor.uav_name}/joint_states", JointState, sensor)
         elif kind is OdometrySamples:
-            self._advertise(_odometry_topic(sensor), Odometry)
+            self._advertise(_odometry_topic(sensor), Odometry, sensor)
             if sensor.name == "odom" and in_map:
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
         else:
             for topic in SENSOR_TOPICS[kind]:
-                self._advertise(topic.name_of(sensor), topic.message_class)
+                self._advertise(topic.name_of(sensor), topic.message_class, sensor)
             if kind is not BatterySamples:
                 self._static.append(_mount_transform(base, sensor.path, mount))
 
@@ -123,7 +135,7 @@ class GraphPublisher:
         local: in a divided run, this machine samples the camera.
         """
         self._static_sent = False
-        self.cameras.announce(camera, local=local)
+        self._of_sensor[camera.sensor.path] = self.cameras.announce(camera, local=local)
         sensor, optical = camera.sensor, make_mount(attitude_body=OPTICAL_ATTITUDE)
         base = f"{sensor.uav_name}/base_link"
         self._static.append(_mount_transform(base, sensor.path, mount))
@@ -144,7 +156,8 @@ class GraphPublisher:
         """
         self._static_sent = False
         self._mounts[sensor.path] = mount
-        self._lidars.announce(sensor, model, topic, mount, local=local)
+        made = self._lidars.announce(sensor, model, topic, mount, local=local)
+        self._of_sensor[sensor.path] = made
         if not mount.nods:
             base = f"{sensor.uav_name}/base_link"
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))
@@ -155,9 +168,15 @@ class GraphPublisher:
         last = len(rows)
         self._static.sort(key=lambda t: rows.get(t.child_frame_id.split("/")[0], last))
 
+    def has_receivers(self, sensors: Sequence[SensorId]) -> bool:
+        """Returns whether a message of any of these sensors would be delivered."""
+        return self._tf.has_subscribers or any(map(self._is_heard, sensors))
+
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's sensors, and removes its static transforms."""
         below = f"/{uav_name}/"
+        for path in [path for path in self._of_sensor if path.startswith(below[1:])]:
+            del self._of_sensor[path]
         for topic in [topic for topic in self._publishers if topic.startswith(below)]:
             self._publishers.pop(topic).cancel()
         self._lidars.retire(uav_name)
@@ -204,12 +223,14 @@ class GraphPublisher:
 
     def _odometry(self, readings: OdometrySamples) -> None:
         transforms = []
-        for i, sensor in enumerate(readings.sensors):
+        tf = self._tf.has_subscribers
+        for i in range(len(readings.sensors)) if tf else self._heard_rows(readings.sensors):
+            sensor = readings.sensors[i]
             position = readings.position_odom[i].tolist()
             attitude = Quaternion(*readings.attitude[i].tolist())
             base = f"{sensor.uav_name}/base_link"
             frame = "map" if readings.is_ground_truth else f"{sensor.uav_name}/odom"
-            if not readings.is_ground_truth and self._tf.has_subscribers:
+            if tf and not readings.is_ground_truth:
                 transforms.append(
                     TransformStamped(
                         header(readings.stamp_ns, frame),
@@ -239,11 +260,13 @@ class GraphPublisher:
 
     def _joints(self, joints: JointAngles) -> None:
         transforms = []
-        for i, sensor in enumerate(joints.sensors):
+        tf = self._tf.has_subscribers
+        for i in range(len(joints.sensors)) if tf else self._heard_rows(joints.sensors):
+            sensor = joints.sensors[i]
             mount = self._mounts[sensor.path]
             base = f"{sensor.uav_name}/base_link"
             angle = float(joints.angle[i])
-            if self._tf.has_subscribers:
+            if tf:
                 q = rotations.multiply(mount.attitude_body, rotations.from_rpy(0.0, angle, 0.0))
                 transforms.append(
                     TransformStamped(
@@ -268,16 +291,30 @@ class GraphPublisher:
 
     def _by_topic(self, samples: Any) -> None:
         for topic in SENSOR_TOPICS[type(samples)]:
-            for row, sensor in enumerate(samples.sensors):
-                publisher = self._publishers[topic.name_of(sensor)]
+            for row in self._heard_rows(samples.sensors):
+                publisher = self._publishers[topic.name_of(samples.sensors[row])]
                 if publisher.has_subscribers:
                     message = topic.message(samples, row)
                     if message is not None:
                         publisher.publish(message)
 
-    def _advertise(self, topic: str, message_class: type[Any]) -> None:
+    def _heard_rows(self, sensors: Sequence[SensorId]) -> list[int]:
+        """Returns the rows of sensors with subscribers."""
+        found = self._heard.get(id(sensors))
+        if found is None or found.changes != self._graph.changes:
+            rows = [row for row, sensor in enumerate(sensors) if self._is_heard(sensor)]
+            if len(self._heard) > _MOST_CACHED:
+                self._heard.clear()
+            found = self._heard[id(sensors)] = _Heard(self._graph.changes, sensors, rows)
+        return found.rows
+
+    def _is_heard(self, sensor: SensorId) -> bool:
+        return any(each.has_subscribers for each in self._of_sensor.get(sensor.path, ()))
+
+    def _advertise(self, topic: str, message_class: type[Any], sensor: SensorId) -> None:
         if topic not in self._publishers:
             self._publishers[topic] = self._graph.advertise(topic, message_class)
+        self._of_sensor.setdefault(sensor.path, []).append(self._publishers[topic])
 
 
 def _imu(readings: ImuSamples, row: int) -> Imu:

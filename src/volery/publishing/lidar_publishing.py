@@ -70,21 +70,24 @@ class LidarPublisher:
 
     def announce(
         self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount, *, local: bool
-    ) -> None:
+    ) -> list[Publisher]:
         """Advertises a LIDAR's topics; all echoes go to `echoes`, in the scan topic's namespace.
 
-        local: in a divided run, this machine samples the LIDAR.
+        local: in a divided run, this machine samples the LIDAR. Returns the publishers.
         """
-        self._returns.announce(sensor, mount, topic, local=local)
+        made = self._returns.announce(sensor, mount, topic, local=local)
         if not isinstance(model.scan, PlanarScan):
             self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2, local=local)
-            return
+            return [*made, self._clouds[sensor.path]]
         self._scans[sensor.path] = self._graph.advertise(topic, LaserScan, local=local)
+        made.append(self._scans[sensor.path])
         if model.echoes > 1:
             beside = f"{topic.rsplit('/', 1)[0]}/echoes"
             self._echoes[sensor.path] = self._graph.advertise(
                 beside, MultiEchoLaserScan, local=local
             )
+            made.append(self._echoes[sensor.path])
+        return made
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's LIDARs."""

@@ -38,11 +38,15 @@ class ReturnsPublisher:
         self._graph = graph
         self._lidars: dict[str, tuple[Publisher, Mount]] = {}
 
-    def announce(self, sensor: SensorId, mount: Mount, topic: str, *, local: bool) -> None:
+    def announce(
+        self, sensor: SensorId, mount: Mount, topic: str, *, local: bool
+    ) -> list[Publisher]:
         """Advertises a LIDAR's returns, unless its own points have that topic."""
-        if topic != returns_topic(sensor):
-            publisher = self._graph.advertise(returns_topic(sensor), PointCloud2, local=local)
-            self._lidars[sensor.path] = publisher, mount
+        if topic == returns_topic(sensor):
+            return []
+        publisher = self._graph.advertise(returns_topic(sensor), PointCloud2, local=local)
+        self._lidars[sensor.path] = publisher, mount
+        return [publisher]
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's LIDARs."""

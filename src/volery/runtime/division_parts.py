@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from volery.engine.engine import Engine
+from volery.engine.engine import Engine, SensorBank
 from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.runtime.replay.command_log import CommandLog
@@ -20,5 +20,7 @@ class DivisionParts(NamedTuple):
     commands: CommandLog
     repeater: CommandRepeater
     """Repeats the commands that a leader's clients give."""
+    has_receivers: Callable[[SensorBank], bool]
+    """Returns whether messages of a bank's sensors are delivered on this machine."""
     nodes: Callable[[], Sequence[Node]]
     """Returns the nodes of this machine."""

@@ -321,7 +321,14 @@ class Simulation(Uncopied):
         engine, graph, manager = self._engine, self.graph, self._manager
         repeater = CommandRepeater(graph, engine, self._pacer, self.commands)
         engine.division = connect(
-            DivisionParts(engine, graph, self.commands, repeater, lambda: tuple(manager.nodes))
+            DivisionParts(
+                engine,
+                graph,
+                self.commands,
+                repeater,
+                lambda bank: manager.publisher.has_receivers(bank.sensors),
+                lambda: tuple(manager.nodes),
+            )
         )
 
     def follow(self) -> None:

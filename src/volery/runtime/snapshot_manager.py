@@ -72,6 +72,7 @@ class SnapshotManager:
     def snapshot(self) -> Snapshot:
         """Returns the present state. Raises `SnapshotError` if it cannot be saved."""
         check_nodes(self._manager.nodes, "a snapshot")
+        self._check_whole("a snapshot")
         self._check("a snapshot")
         self._engine.state_check.look()
         return Snapshot(self._engine.time_ns, id(self), self._manager.starts, self._state())
@@ -79,6 +80,7 @@ class SnapshotManager:
     def restore(self, snapshot: Snapshot) -> None:
         """Restores `snapshot`. Raises `SnapshotError` if it is not of this simulation and fleet."""
         check_nodes(self._manager.nodes, "to restore a state")
+        self._check_whole("to restore a state")
         self._check("to restore a state")
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"not a snapshot: {snapshot!r}; pass what snapshot() returned")
@@ -147,6 +149,10 @@ class SnapshotManager:
         check_partners(self._partners, what, to_start=to_start)
         if not self._engine.stands:
             raise SnapshotError(f"{what} is not possible in the middle of a tick; use post()")
+
+    def _check_whole(self, what: str) -> None:
+        if self._engine.division is not None:
+            raise SnapshotError(f"{what} is not possible in a run that is divided among machines")
 
     def _state(self) -> dict[str, Any]:
         digest = self._outlet.digest

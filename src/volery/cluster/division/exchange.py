@@ -45,7 +45,7 @@ class Outbox:
         self._matching: frozenset[str] = frozenset()
         self._seen_changes = -1
         self._tap = graph.subscribe_all(self._take, self._is_wanted)
-        graph.on_node_call = self._call
+        graph.on_node_call = self.call
 
     def want(self, wanted: Collection[str], declared: Collection[str] | None = None) -> None:
         """Collects messages on the topics `wanted`, which have subscribers on other machines.
@@ -54,12 +54,18 @@ class Outbox:
         those on all topics are.
         """
         self._wanted, self._declared = wanted, declared
-        self._seen_changes = -1
+        self._graph.changes += 1
 
     def flush(self) -> list[Item]:
         """Returns the items since the last call."""
         items, self._items = self._items, []
         return items
+
+    def call(self, service: str, request: Any) -> None:
+        """Adds a call of a service by a node."""
+        if self._graph.has_service(service):
+            srvtype = self._graph.service_type(service)
+            self._items.append([CALL, service, srvtype, encode_cdr(request, f"{srvtype}_Request")])
 
     def command(self, taken: ClientCommand) -> None:
         """Adds a command of a client that is about to take effect."""
@@ -102,11 +108,6 @@ class Outbox:
     def _take_external(self, published: Published) -> None:
         if self._graph.sender is None:
             self._items.append([EXTERNAL, published.topic, published.msgtype, published.cdr])
-
-    def _call(self, service: str, request: Any) -> None:
-        if self._graph.has_service(service):
-            srvtype = self._graph.service_type(service)
-            self._items.append([CALL, service, srvtype, encode_cdr(request, f"{srvtype}_Request")])
 
 
 class Inbox:

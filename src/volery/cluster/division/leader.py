@@ -1,15 +1,15 @@
 """The leader's end of a divided run.
 
-At the end of each tick it waits for what the workers have published, and passes it on; at the
-beginning of the next one it sends them what its own nodes have published and its clients have
-commanded, with the step at which the tick ends: the earliest at which anything is due anywhere.
-Where a worker's nodes may respond to that, the machines exchange again before the tick.
+Where the machines meet, it waits for what the workers have published, and passes it on; then it
+sends them what its own nodes have published and its clients have commanded, with the step of the
+next meeting. Where a worker's nodes may respond to that, the machines exchange again first.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -26,7 +26,9 @@ from volery.cluster.division.exchange import (
     state_hash,
 )
 from volery.cluster.division.link import Frame, Link, LinkError
-from volery.core.errors import DivisionError, VoleryError
+from volery.cluster.division.meetings import Meetings
+from volery.core.errors import DivisionError, GraphError, VoleryError
+from volery.graph.codecs.zero import zero_message
 from volery.runtime.division_parts import DivisionParts
 
 _SIZE_BYTES = 4
@@ -97,30 +99,49 @@ class Leader:
         self._members = list(members)
         self._substitute = substitute
         self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
+        self._meetings = Meetings(parts)
         self._seen_changes = -1
         self._exchanges = 0
+        self._abandoned: list[str] = []
         parts.commands.on_noted = self._outbox.command
         for member in self._members:
             self._inbox.declare(member.topics)
         self._note_wishes()
 
+    @property
+    def meets(self) -> bool:
+        """Whether all machines are at the present step."""
+        return self._meetings.is_open
+
     def begin_tick(self, last_step: int) -> int:
-        """Sends what has happened here, until no worker responds; returns the tick's end."""
-        while True:
+        """At a meeting, sends what has happened here until no worker responds, and ends it."""
+        meetings = self._meetings
+        while meetings.is_open:
             own = self._outbox.flush()
             pending = {member: self._items_for(member, own) for member in self._members}
-            final = not any(_may_respond(member, items) for member, items in pending.items())
-            end = min([self._engine.horizon(last_step), *(m.due for m in self._members)])
-            end = max(end, self._engine.fleet.step)
+            news = self._news()
+            final = not any(
+                news[member] or _may_respond(member, items) for member, items in pending.items()
+            )
+            due = min([last_step, meetings.due_step(), *(member.due for member in self._members)])
+            next_step = max(due, self._engine.fleet.step)
             for member, items in pending.items():
-                frame = ["t", items, final, end, self._news_for(member)]
+                frame = ["t", items, final, next_step, news[member]]
                 self._reach(member, partial(_send, frame))
             if final:
-                return end
-            self.end_tick()
+                meetings.close(next_step)
+            else:
+                self._receive()
+        return min(last_step, meetings.next_step)
 
     def end_tick(self) -> None:
-        """Receives and applies what the workers have published."""
+        """At a meeting, receives and applies what the workers have published."""
+        if self._meetings.comes():
+            self._receive()
+            self._hold_abandoned()
+            self._meetings.is_open = True
+
+    def _receive(self) -> None:
         own_hash = state_hash(self._engine.fleet, self._exchanges)
         self._exchanges += 1
         for member in tuple(self._members):
@@ -174,6 +195,7 @@ class Leader:
                 link = self._substitute(member, str(error))
                 if link is None:
                     self._members.remove(member)
+                    self._abandoned += sorted(member.uavs)
                     member.close()
                     return None
                 member.link.close()
@@ -182,27 +204,36 @@ class Leader:
                     return None
         return None
 
+    def _hold_abandoned(self) -> None:
+        """Has the UAVs of workers that are not replaced hold their positions."""
+        while self._abandoned:
+            service = f"/{self._abandoned.pop()}/hold"
+            request = zero_message("std_srvs/srv/Trigger_Request")
+            self._outbox.call(service, request)
+            with suppress(GraphError):  # the UAV has been deleted
+                self._graph.call(service, request)
+
     def _items_for(self, member: Member, own: list[Item]) -> list[Item]:
         items = [*member.relayed, *(item for item in own if _concerns(member, item))]
         member.relayed = []
         return items
 
-    def _news_for(self, member: Member) -> list[list[str]] | None:
-        """Returns which of its topics have subscribers elsewhere, if that has changed."""
-        if self._graph.changes != self._seen_changes:
-            self._seen_changes = self._graph.changes
-            self._subscribed = frozenset(self._inbox.subscribed())
-            self._shown = frozenset(self._inbox.shown())
-        others: set[str] = set()
-        for other in self._members:
-            if other is not member:
-                others |= other.subscribed
-        wanted = [t for t in member.topics if t in self._subscribed or t in others]
-        shown = [topic for topic in member.topics if topic in self._shown]
-        if (wanted, shown) == member.told:
-            return None
-        member.told = wanted, shown
-        return [wanted, shown]
+    def _news(self) -> dict[Member, list[list[str]] | None]:
+        """Returns which topics of each worker have subscribers elsewhere, if that has changed."""
+        found: dict[Member, list[list[str]] | None] = dict.fromkeys(self._members)
+        if self._graph.changes == self._seen_changes:
+            return found
+        self._seen_changes = self._graph.changes
+        here, all_shown = set(self._inbox.subscribed()), set(self._inbox.shown())
+        for member in self._members:
+            others = (other.subscribed for other in self._members if other is not member)
+            elsewhere = here.union(*others)
+            wanted = [topic for topic in member.topics if topic in elsewhere]
+            shown = [topic for topic in member.topics if topic in all_shown]
+            if (wanted, shown) != member.told:
+                member.told = wanted, shown
+                found[member] = [wanted, shown]
+        return found
 
     def _note_wishes(self) -> None:
         """Collects what workers need."""

@@ -1,0 +1,123 @@
+"""Links between machines: who is admitted, what is refused, what counts as a loss."""
+
+import socket
+import struct
+import threading
+
+import pytest
+
+from volery.cluster.division import link as links
+from volery.cluster.division.link import Link, LinkError, admit, apply_to
+
+VERSIONS = {"volery": "0.1.0", "numba": "0.68.1"}
+
+
+def pair():
+    ends = socket.socketpair()
+    return Link(ends[0], "worker 1"), Link(ends[1], "the leader")
+
+
+def met(token, versions):
+    """Returns what becomes of a worker with this token and these versions, at both ends."""
+    leader, worker = pair()
+    found = {}
+
+    def serve():
+        try:
+            admit(leader, "the token", VERSIONS)
+        except LinkError as error:
+            found["leader"] = str(error)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        apply_to(worker, token, versions)
+    except LinkError as error:
+        found["worker"] = str(error)
+    thread.join(60.0)
+    leader.close()
+    worker.close()
+    return found
+
+
+def test_a_worker_with_the_token_is_admitted():
+    assert met("the token", VERSIONS) == {}
+
+
+def test_a_worker_with_another_token_is_refused_and_told():
+    assert met("another", VERSIONS) == {
+        "leader": "worker 1 was refused: the token is wrong",
+        "worker": "the leader refuses this worker: the token is wrong",
+    }
+
+
+def test_a_worker_with_other_versions_is_refused_and_told():
+    reason = "it has numba 0.69.0, the leader has 0.68.1"
+    assert met("the token", {**VERSIONS, "numba": "0.69.0"}) == {
+        "leader": f"worker 1 was refused: {reason}",
+        "worker": f"the leader refuses this worker: {reason}",
+    }
+
+
+def test_a_leader_that_does_not_know_the_token_is_left():
+    leader, worker = pair()
+
+    def pretend():
+        leader.send("leader", bytes(32))
+        leader.receive()
+        leader.send("welcome", bytes(32))
+
+    thread = threading.Thread(target=pretend)
+    thread.start()
+    with pytest.raises(LinkError, match="the leader does not know the token"):
+        apply_to(worker, "the token", VERSIONS)
+    thread.join(60.0)
+    leader.close()
+    worker.close()
+
+
+@pytest.mark.parametrize(
+    ("sent", "reason"),
+    [
+        (b"GET / HTTP/1.1\r\n\r\n", "worker 1 sends no frames of a divided run"),
+        (struct.pack(">I", 3) + b"\xff\xff\xff", "worker 1 sends a broken frame"),
+        (struct.pack(">I", 1) + b"\x01", "worker 1 sends a broken frame"),
+        (struct.pack(">I", 1) + b"\x80", "worker 1 sends a broken frame"),
+        (struct.pack(">I", 8) + b"\x01", "worker 1 is lost: it ended the connection"),
+    ],
+)
+def test_other_bytes_end_the_connection_with_a_reason(sent, reason):
+    ends = socket.socketpair()
+    ends[1].sendall(sent)
+    ends[1].close()
+    leader = Link(ends[0], "worker 1")
+    with pytest.raises(LinkError, match=reason):
+        leader.receive()
+    leader.close()
+
+
+def test_a_silent_machine_is_lost_and_one_that_shows_life_is_not(monkeypatch):
+    monkeypatch.setattr(links, "SILENCE_S", 1.0)
+    monkeypatch.setattr(links, "_SIGN_S", 0.05)
+    leader, worker = pair()
+    worker.show_life()
+    sent = threading.Timer(3.0, worker.send, ("b", 1))
+    sent.start()
+    assert leader.receive() == ["b", 1]
+    worker._closed.set()  # its signs end, and its connection stays
+    with pytest.raises(LinkError, match="worker 1 is lost: no sign of life"):
+        leader.receive()
+    leader.close()
+    worker.close()
+
+
+def test_large_frames_come_after_the_greeting_only():
+    leader, worker = pair()
+    large = bytes(200_000)
+    thread = threading.Thread(target=worker.send, args=("b", large))
+    leader.show_life()
+    thread.start()
+    assert leader.receive() == ["b", large]
+    thread.join(60.0)
+    leader.close()
+    worker.close()
