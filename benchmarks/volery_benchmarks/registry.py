@@ -342,7 +342,9 @@ BENCHES: dict[str, Bench] = {
             "own, or together as environments; beside a bare loop over the same runs; "
             "`killed_and_resumed`: 1 if the table of a study of 2,000 runs, whose driver was "
             "killed five times, equals that of an uninterrupted one; `ray_...`: on a Ray "
-            "cluster of two network namespaces with a core each; a worker is killed, the link cut",
+            "cluster of two network namespaces with a core each; a worker is killed, the link cut; "
+            "`split_...`: `forest_survey` with 40 UAVs, `obstacle_field` (depth cameras) with 8, "
+            "divided between these machines",
             {
                 "sweep_runs_per_s_core": Bound(20.0),
                 "sweep_runs_per_s_core_vectorized": Bound(500.0),
@@ -352,6 +354,10 @@ BENCHES: dict[str, Bench] = {
                 "ray_digests_equal": Bound(1.0),
                 "loss_noticed_s": Bound(10.0, at_most=True),
                 "results_lost": Bound(0.0, at_most=True),
+                "split_efficiency": Bound(0.90),
+                "split_digests_equal": Bound(1.0),
+                "split_cameras_efficiency": Bound(0.90),
+                "split_cameras_digests_equal": Bound(1.0),
             },
             in_all=False,  # it needs the extra "cluster"
             has_quick=True,

@@ -1,8 +1,8 @@
-"""Measures studies of many runs, on one machine and on two."""
+"""Measures studies of many runs, on one machine and on two, and one run on two machines."""
 
 from __future__ import annotations
 
-from volery_benchmarks.cluster import studies, two_machines
+from volery_benchmarks.cluster import divided, namespaces, studies, two_machines
 from volery_benchmarks.registry import Measured
 
 
@@ -14,4 +14,9 @@ def measure(*, quick: bool = False) -> Measured:
         failures["two machines"] = missing
     else:
         figures |= two_machines.measure(quick=quick)
+    missing = namespaces.what_is_missing()
+    if missing:
+        failures["divided runs"] = missing
+    else:
+        figures |= divided.measure(quick=quick)
     return Measured(figures, failures)

@@ -2,7 +2,7 @@
 
 Two network namespaces of this machine stand for two machines: each has an address of its own and
 one core. The head of the cluster and the driver are in the first one, so they share its core with
-a worker. Needs root, `ip` and `taskset`.
+a worker.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import json
 import logging
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -24,11 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import VoleryError
-from volery.core.machine import usable_cores
+from volery_benchmarks.cluster import namespaces
 
 _LOG = logging.getLogger(__name__)
-_NAMES = ("volery_bench_a", "volery_bench_b")
-_ADDRESSES = ("10.77.0.1", "10.77.0.2")
 _PORT = 6379
 _RUNS, _QUICK_RUNS = 300, 40
 _START_S = 120.0
@@ -48,11 +45,11 @@ seen, first = {}, None
 
 def note(progress):
     global first
-    if progress.done and first is None:
-        first = time.time(), progress.done
-        print("flying", flush=True)
     for worker in progress.workers:
         seen.setdefault(worker.name, time.time())
+    if progress.done and first is None and len(seen) >= int(workers):
+        first = time.time(), progress.done
+        print("flying", flush=True)
 
 table = run_study(study, results, workers=int(workers), ray=address, on_progress=note)
 end = time.time()
@@ -64,18 +61,16 @@ print(json.dumps({"rate": rate, "failed": failed, "seen": seen, "digests": table
 
 
 def what_is_missing() -> str:
-    """Returns why two machines cannot be had here; empty: they can."""
+    """Returns why a cluster of two machines cannot be had here; empty: it can."""
     if importlib.util.find_spec("ray") is None:
         return 'Ray: pip install "volery[cluster]"'
-    if os.geteuid() or shutil.which("ip") is None or shutil.which("taskset") is None:
-        return "root, ip and taskset are needed for network namespaces"
-    return "" if usable_cores() > 1 else "a second core"
+    return namespaces.what_is_missing()
 
 
 def measure(*, quick: bool = False) -> dict[str, float]:
     """Returns the figures."""
     runs = _QUICK_RUNS if quick else _RUNS
-    with tempfile.TemporaryDirectory() as folder, _namespaces():
+    with tempfile.TemporaryDirectory() as folder, namespaces.namespaces():
         work = Path(folder)
         study = work / "study" / "study.toml"  # its folder is copied to the machines
         study.parent.mkdir()
@@ -85,7 +80,7 @@ def measure(*, quick: bool = False) -> dict[str, float]:
         with _cluster(work, nodes=2):
             both = _fly(study, work / "both", 2)
             killed = _fly(study, work / "killed", 2, _kill_worker)
-            cut = _fly(study, work / "cut", 2, _cut_link)
+            cut = _fly(study, work / "cut", 2, namespaces.cut_link)
     expected = alone["digests"]
     losses = {"worker": killed, "node": cut}
     return {
@@ -102,36 +97,23 @@ def measure(*, quick: bool = False) -> dict[str, float]:
 
 
 @contextmanager
-def _namespaces() -> Iterator[None]:
-    """Makes two namespaces, joined by a pair of virtual interfaces."""
-    first, second = _NAMES
-    with ExitStack() as made:
-        for name in _NAMES:
-            _ip("netns", "add", name)
-            made.callback(_ip, "netns", "del", name)
-        pair = ("type", "veth", "peer", "name", "peer", "netns", second)
-        _ip("link", "add", "peer", "netns", first, *pair)
-        for name, address in zip(_NAMES, _ADDRESSES, strict=True):
-            _ip("-n", name, "addr", "add", f"{address}/24", "dev", "peer")
-            for device in ("peer", "lo"):
-                _ip("-n", name, "link", "set", device, "up")
-        yield
-
-
-@contextmanager
 def _cluster(work: Path, nodes: int) -> Iterator[None]:
     """Starts a Ray cluster with a node in each of the first namespaces."""
     token = work / "token"
     token.write_text(os.urandom(16).hex(), encoding="ascii")
     token.chmod(0o600)
-    head = f"{_ADDRESSES[0]}:{_PORT}"
+    head = f"{namespaces.ADDRESSES[0]}:{_PORT}"
     os.environ.update(_environment(token))
     with ExitStack() as started:
         for k in range(nodes):
             own = ("--head", f"--port={_PORT}", "--include-dashboard=false")
             words = [
                 *("start", "--block", *(own if k == 0 else (f"--address={head}",))),
-                *(f"--node-ip-address={_ADDRESSES[k]}", "--num-cpus=1", "--disable-usage-stats"),
+                *(
+                    f"--node-ip-address={namespaces.ADDRESSES[k]}",
+                    "--num-cpus=1",
+                    "--disable-usage-stats",
+                ),
                 f"--temp-dir={tempfile.mkdtemp(dir=work)}",
             ]
             started.enter_context(_node(k, words, work / f"node_{nodes}_{k}.log"))
@@ -148,7 +130,7 @@ def _environment(token: Path) -> Mapping[str, str]:
 
 @contextmanager
 def _node(machine: int, words: Sequence[str], log: Path) -> Iterator[None]:
-    command = _on(machine, [sys.executable, "-m", "ray.scripts.scripts", *words])
+    command = namespaces.on(machine, [sys.executable, "-m", "ray.scripts.scripts", *words])
     with log.open("wb") as output:
         node = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
     try:
@@ -175,8 +157,8 @@ def _fly(
 
     Returns what the driver prints and, with `lose`, after how many seconds a worker was replaced.
     """
-    words = [str(study), str(results), f"{_ADDRESSES[0]}:{_PORT}", str(workers)]
-    command = _on(0, [sys.executable, "-P", "-c", _DRIVER, *words])
+    words = [str(study), str(results), f"{namespaces.ADDRESSES[0]}:{_PORT}", str(workers)]
+    command = namespaces.on(0, [sys.executable, "-P", "-c", _DRIVER, *words])
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as driver:
         output = driver.stdout
         assert output is not None
@@ -198,28 +180,10 @@ def _fly(
 def _kill_worker() -> None:
     """Kills a worker on the second machine."""
     listed = subprocess.run(
-        ["ip", "netns", "pids", _NAMES[1]], capture_output=True, text=True, check=True
+        ["ip", "netns", "pids", namespaces.NAMES[1]], capture_output=True, text=True, check=True
     )
     for pid in map(int, listed.stdout.split()):
         if Path(f"/proc/{pid}/cmdline").read_bytes().startswith(b"ray::RunActor"):
             os.kill(pid, signal.SIGKILL)
             return
     raise VoleryError("no worker flies on the second machine")
-
-
-def _cut_link() -> None:
-    """Cuts the link silently: frames go to an address that no interface has."""
-    for name, peer in zip(_NAMES, _ADDRESSES[::-1], strict=True):
-        nowhere = ("lladdr", "02:00:00:00:00:99", "nud", "permanent", "dev", "peer")
-        _ip("-n", name, "neigh", "replace", peer, *nowhere)
-
-
-def _on(machine: int, command: Sequence[str]) -> list[str]:
-    """Returns a command that runs on a machine, which has one core."""
-    return ["ip", "netns", "exec", _NAMES[machine], "taskset", "-c", str(machine), *command]
-
-
-def _ip(*words: str) -> None:
-    done = subprocess.run(["ip", *words], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise VoleryError(f"ip {' '.join(words)}: {done.stderr.strip()}")

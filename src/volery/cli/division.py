@@ -52,7 +52,7 @@ def workers_of(
     division = DivisionOptions(
         options.workers, listen, options.token, options.drop_lost, options.trust
     )
-    with Workers(division, scenario, _tell, is_stopped) as workers:
+    with Workers(division, scenario, _show, is_stopped) as workers:
         yield workers
 
 
@@ -88,7 +88,7 @@ def join_run(address: str, token: str | None, threads: int | None, *, trust: boo
         threads=threads or usable_cores(),
         trust=trust,
         wait_s=_WAIT_S,
-        tell=_tell,
+        show=_show,
     )
     echo_line(reason)
 
@@ -107,5 +107,5 @@ def _check(options: RunOptions) -> None:
         warn(f"--workers {options.workers}: this machine has {cores} cores, one is the leader's")
 
 
-def _tell(line: str) -> None:
+def _show(line: str) -> None:
     echo_line(line, err=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from volery.cli.bridge_checks import check_bridges, token_gaps
 from volery.cli.bridges import fit_out, open_bridges
@@ -22,7 +22,6 @@ from volery.cli.trust import with_trust
 from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
 from volery.core.errors import CommandError, ScenarioError
-from volery.runtime.build.share import WHOLE
 from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
@@ -88,17 +87,17 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
     change = _Change(options)
     page.building(scenario)
     return_large_blocks()
-    stopped = lambda: interrupts.pressed  # noqa: E731
     with (
-        workers_of(options, scenario, stopped) as workers,
+        workers_of(options, scenario, lambda: interrupts.pressed) as workers,
         FlightProgress(scenario.name, scenario.duration_s) as progress,
     ):
+        partition: dict[str, Any] = {} if workers is None else {"partition": workers.gather()}
         simulation = Simulation(
             scenario,
             threads=threads,
             recordings=options.recordings,
             on_load=change.ask,
-            share=WHOLE if workers is None else workers.gather(),
+            **partition,
         )
         change.quit = simulation.clock.quit
         if flight is not None:

@@ -75,18 +75,21 @@ class Division(Protocol):
     """Keeps the machines of a divided run in lock step; each has an engine of its own."""
 
     @property
-    def meets(self) -> bool:
+    def at_barrier(self) -> bool:
         """Whether all machines are at the present step, so that commands may be executed."""
 
     def begin_tick(self, last_step: int) -> int:
-        """Takes over what others have published, where the machines meet.
+        """Takes over what others have published, at a barrier of the machines.
 
-        last_step: the step at which the tick ends at the latest. Returns that of the next meeting,
+        last_step: the step at which the tick ends at the latest. Returns that of the next barrier,
         if it is earlier.
         """
 
+    def exchange_responses(self) -> None:
+        """Exchanges responses to sensors' messages at a barrier, before timers are called."""
+
     def end_tick(self) -> None:
-        """Passes on what this machine has published, where the machines meet."""
+        """Passes on what this machine has published, at a barrier of the machines."""
 
     def end_round(self) -> None:
         """Called when the effects of some commands of clients have been delivered."""

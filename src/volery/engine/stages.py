@@ -31,10 +31,10 @@ def take_commands(engine: Engine, tick: Tick) -> None:
 
     The state is consistent here, so an action may restore an earlier state. Publications are
     delivered at once, so that they affect the physics steps of this tick. In a divided run, this
-    waits until the machines meet.
+    waits at a barrier of its machines.
     """
     division = engine.division
-    if division is None or division.meets:
+    if division is None or division.at_barrier:
         engine.process_commands()
     if division is not None:
         tick.last_step = division.begin_tick(tick.last_step)
@@ -81,6 +81,8 @@ def raise_events(engine: Engine, _tick: Tick) -> None:
 def publish(engine: Engine, _tick: Tick) -> None:
     """Delivers the samples' messages, then calls due timers; nodes respond with commands."""
     engine.sink.deliver()
+    if engine.division is not None:
+        engine.division.exchange_responses()
     while (action := engine.deadlines.pop_due(engine.fleet.step)) is not None:
         action()
         engine.sink.deliver()

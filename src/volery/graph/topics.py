@@ -91,7 +91,7 @@ class Publisher:
         self.latched = latched
         self.local = local
         """Whether only this machine of a divided run has the publisher; see `Graph.advertise`."""
-        self._seen_changes, self._is_heard = -1, False
+        self._seen_changes, self._has_receivers = -1, False
         self.owner = ""
         """Full name of the publisher's node; empty: none."""
         self.lasting = False
@@ -118,9 +118,9 @@ class Publisher:
         changes = self._graph.changes
         if changes != self._seen_changes:
             topic = self._topic
-            self._is_heard = bool(topic.callbacks or self._graph.is_recorded(topic.name))
+            self._has_receivers = bool(topic.callbacks or self._graph.is_recorded(topic.name))
             self._seen_changes = changes
-        return self.latched or self._is_heard
+        return self.latched or self._has_receivers
 
     def publish(self, message: Any) -> None:
         """Queues a message for delivery; has no effect after `cancel`."""

@@ -71,7 +71,7 @@ _IDENTITY = Quaternion(0.0, 0.0, 0.0, 1.0)
 _MOST_CACHED = 1000
 
 
-class _Heard(NamedTuple):
+class _ReceivingRows(NamedTuple):
     """The sensors of some samples that have subscribers, until subscriptions change."""
 
     changes: int
@@ -91,7 +91,7 @@ class GraphPublisher:
         self._mounts: dict[str, Mount] = {}
         self._of_sensor: dict[str, list[Publisher]] = {}
         """Publishers of each sensor, by its path."""
-        self._heard: dict[int, _Heard] = {}
+        self._receiving: dict[int, _ReceivingRows] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
         self._tf_static = graph.advertise("/tf_static", TFMessage, latched=True)
@@ -170,7 +170,7 @@ class GraphPublisher:
 
     def has_receivers(self, sensors: Sequence[SensorId]) -> bool:
         """Returns whether a message of any of these sensors would be delivered."""
-        return self._tf.has_subscribers or any(map(self._is_heard, sensors))
+        return self._tf.has_subscribers or any(map(self._has_receiver, sensors))
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's sensors, and removes its static transforms."""
@@ -224,7 +224,7 @@ class GraphPublisher:
     def _odometry(self, readings: OdometrySamples) -> None:
         transforms = []
         tf = self._tf.has_subscribers
-        for i in range(len(readings.sensors)) if tf else self._heard_rows(readings.sensors):
+        for i in self._receiving_rows(readings.sensors, every=tf):
             sensor = readings.sensors[i]
             position = readings.position_odom[i].tolist()
             attitude = Quaternion(*readings.attitude[i].tolist())
@@ -261,7 +261,7 @@ class GraphPublisher:
     def _joints(self, joints: JointAngles) -> None:
         transforms = []
         tf = self._tf.has_subscribers
-        for i in range(len(joints.sensors)) if tf else self._heard_rows(joints.sensors):
+        for i in self._receiving_rows(joints.sensors, every=tf):
             sensor = joints.sensors[i]
             mount = self._mounts[sensor.path]
             base = f"{sensor.uav_name}/base_link"
@@ -291,24 +291,28 @@ class GraphPublisher:
 
     def _by_topic(self, samples: Any) -> None:
         for topic in SENSOR_TOPICS[type(samples)]:
-            for row in self._heard_rows(samples.sensors):
+            for row in self._receiving_rows(samples.sensors):
                 publisher = self._publishers[topic.name_of(samples.sensors[row])]
                 if publisher.has_subscribers:
                     message = topic.message(samples, row)
                     if message is not None:
                         publisher.publish(message)
 
-    def _heard_rows(self, sensors: Sequence[SensorId]) -> list[int]:
-        """Returns the rows of sensors with subscribers."""
-        found = self._heard.get(id(sensors))
+    def _receiving_rows(self, sensors: Sequence[SensorId], *, every: bool = False) -> Sequence[int]:
+        """Returns the rows of sensors with subscribers, or all."""
+        if every:
+            return range(len(sensors))
+        found = self._receiving.get(id(sensors))
         if found is None or found.changes != self._graph.changes:
-            rows = [row for row, sensor in enumerate(sensors) if self._is_heard(sensor)]
-            if len(self._heard) > _MOST_CACHED:
-                self._heard.clear()
-            found = self._heard[id(sensors)] = _Heard(self._graph.changes, sensors, rows)
+            rows = [row for row, sensor in enumerate(sensors) if self._has_receiver(sensor)]
+            if len(self._receiving) > _MOST_CACHED:
+                self._receiving.clear()
+            found = self._receiving[id(sensors)] = _ReceivingRows(
+                self._graph.changes, sensors, rows
+            )
         return found.rows
 
-    def _is_heard(self, sensor: SensorId) -> bool:
+    def _has_receiver(self, sensor: SensorId) -> bool:
         return any(each.has_subscribers for each in self._of_sensor.get(sensor.path, ()))
 
     def _advertise(self, topic: str, message_class: type[Any], sensor: SensorId) -> None:

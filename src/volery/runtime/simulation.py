@@ -24,7 +24,7 @@ from volery.runtime.build.engine import build_engine
 from volery.runtime.build.gateway import build_gateway
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
-from volery.runtime.build.share import WHOLE, Share
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.start_check import check_start
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
@@ -117,7 +117,7 @@ class Simulation(Uncopied):
         recordings: Path | None = None,
         on_load: OnLoad | None = None,
         shelf: ScenarioCatalog | None = None,
-        share: Share = WHOLE,
+        partition: Partition = WHOLE,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
@@ -131,7 +131,7 @@ class Simulation(Uncopied):
         with compiled(needs_of(scenario)):
             world = build_world(scenario, threads)
         self._pacer = pacer = Pacer()
-        connected = build_engine(scenario, world, pacer, share)
+        connected = build_engine(scenario, world, pacer, partition)
         self._engine = engine = connected.engine
         self.graph = graph = connected.graph
         self._loop = RunLoop(engine, pacer, scenario.duration_s, self._has_ended)
@@ -143,7 +143,7 @@ class Simulation(Uncopied):
         tell_origin(graph, scenario)
         world_topic = WorldTopic(graph, lambda: self.geometry)
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
-        self._manager = manager = build_vehicles(scenario, connected, world, self._runs, share)
+        self._manager = manager = build_vehicles(scenario, connected, world, self._runs, partition)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
         self.uavs = UavView(manager.uavs)
         self.operators = ControlAuthority(lambda: tuple(self.uavs), self.graph.moved_uavs.of)
@@ -314,7 +314,7 @@ class Simulation(Uncopied):
         self._monitor.look()
 
     def divide(self, connect: Callable[[DivisionParts], Division]) -> None:
-        """Keeps this machine in lock step with others that share the run; before the first step.
+        """Keeps this machine in lock step with others that share its run; call it before a step.
 
         connect: returns the connection to the other machines.
         """

@@ -9,13 +9,13 @@ import numpy as np
 
 from volery.cluster.division.leader import Leader, Member, greeting_of
 from volery.cluster.division.link import Link
-from volery.cluster.division.partition import divided
+from volery.cluster.division.partitioning import divided
 from volery.cluster.division.worker import RunEndedError, Worker
 from volery.core.errors import VoleryError
-from volery.graph.messages import LaserScan, Odometry, String, Twist, Vector3
+from volery.graph.messages import Image, LaserScan, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
-from volery.runtime.build.share import Share
+from volery.runtime.build.partition import Partition
 from volery.scenario.load import parse_scenario
 
 HERE = Path(__file__).stem
@@ -33,14 +33,24 @@ class Weaver(Node):
         self.words = self.create_publisher(String, "words", latched=True)
         self.landing = self.create_client("std_srvs/srv/Trigger", "land")
         self.create_subscription(LaserScan, "laser/horizontal/scan", self.on_scan, 5)
+        self.create_subscription(Image, "eye/depth", self.on_image, 5)
         self.create_subscription(Odometry, "odom", self.on_odometry, 5)
         self.create_subscription(String, "orders", self.on_order, 5)
         self.words.publish(String("hello"))
-        self.ordered = 0.0
+        self.ordered = self.climb = 0.0
+        self.create_timer(0.04, self.on_timer)
+
+    def on_timer(self):
+        self.climb = 0.1 * (1.0 if self.climb <= 0.0 else -1.0)
+        self.commands.publish(Twist(Vector3(0.0, 0.0, self.climb), Vector3(0.0, 0.0, 0.0)))
 
     def on_scan(self, scan):
         finite = scan.ranges[np.isfinite(scan.ranges)]
         self.seen = float(finite.sum()) if len(finite) else 0.0
+
+    def on_image(self, image):
+        depth = np.frombuffer(image.data, np.float32)
+        self.seen += float(depth[np.isfinite(depth)].sum())
 
     def on_order(self, order):
         self.ordered = float(order.data)
@@ -59,10 +69,11 @@ class Weaver(Node):
 def scenario_of(count=3, **parameters):
     """Returns a scenario of `count` UAVs that see each other."""
     lidar = {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]}
-    sensors = [lidar, {"kind": "imu"}, {"kind": "odometry"}]
+    camera = {"kind": "camera", "name": "eye", "width": 16, "height": 12, "rate_hz": 10.0}
+    sensors = [lidar, camera, {"kind": "imu"}, {"kind": "odometry"}]
     node = {"node": f"{HERE}:Weaver", "parameters": parameters}
     row = {"type": "weaver", "count": count, "position_m": [0.0, 0.0]}
-    row |= {"last_position_m": [3.0 * (count - 1), 0.0]}
+    row |= {"last_position_m": [3.0 * (count - 1), 0.0], "on_start": "take_off"}
     flight = {"take_off_altitude_m": 0.6}
     return parse_scenario(
         {
@@ -86,10 +97,10 @@ class DividedPair:
     def __enter__(self):
         link = self.start_worker()
         self.simulation = Simulation(
-            self.scenario, threads=1, share=Share(named=self.shares[1])
+            self.scenario, threads=1, partition=Partition(named=self.shares[1])
         ).__enter__()
         self.member = Member(link, self.shares[1])
-        self.member.heard(*greeting_of(link))
+        self.member.update(*greeting_of(link))
         self.simulation.divide(lambda parts: Leader(parts, [self.member], self.on_loss))
         self.division = self.simulation._engine.division
         return self
@@ -114,7 +125,7 @@ class DividedPair:
 
     def substitute(self, lost, _reason):
         """Has another worker repeat the part of a lost one."""
-        link = self.start_worker(lost.num_sent)
+        link = self.start_worker(lost.num_answered)
         greeting_of(link)
         for frame in lost.history():
             link.send_bytes(frame)
@@ -124,9 +135,9 @@ class DividedPair:
         raise AssertionError(reason)
 
     def _serve(self, link, repeated):
-        share = Share(is_leader=False, named=self.shares[1])
+        partition = Partition(is_leader=False, named=self.shares[1])
         try:
-            with Simulation(self.scenario, threads=1, share=share) as simulation:
+            with Simulation(self.scenario, threads=1, partition=partition) as simulation:
                 self.worker = simulation
 
                 def connect(parts):

@@ -7,7 +7,7 @@ import pytest
 from divided_pair import scenario_of
 
 from volery.cluster.division.job import DivisionJob, files_of
-from volery.cluster.division.partition import _groups, divided
+from volery.cluster.division.partitioning import _groups, divided
 from volery.core.errors import DataFileError, DivisionError, ScenarioError
 from volery.graph.nodes.handles import NodeEndpoints
 from volery.scenario.load import load_scenario, parse_scenario

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from volery.core.errors import DivisionError
-from volery.runtime.build.share import Share
+from volery.runtime.build.partition import Partition
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
@@ -58,9 +58,9 @@ class DivisionJob:
         return parse_scenario(self.content, where=where, access=access)
 
     @property
-    def share(self) -> Share:
+    def partition(self) -> Partition:
         """UAVs that the worker serves."""
-        return Share(is_leader=False, named=frozenset(self.uavs))
+        return Partition(is_leader=False, named=frozenset(self.uavs))
 
 
 def files_of(scenario: Scenario) -> dict[str, bytes]:

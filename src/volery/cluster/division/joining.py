@@ -26,7 +26,7 @@ def serve_leader(
     threads: int,
     trust: bool,
     wait_s: float,
-    tell: Callable[[str], None],
+    show: Callable[[str], None],
 ) -> str:
     """Joins the leader at `address` and serves it; returns why the run ended.
 
@@ -44,7 +44,7 @@ def serve_leader(
         if kind != "job":
             raise DivisionError("the leader sends no part of a run")
         job = DivisionJob(**rest[0])
-        tell(f"joined: serves {len(job.uavs)} UAVs")
+        show(f"joined: serves {len(job.uavs)} UAVs")
         with tempfile.TemporaryDirectory(prefix="volery_") as place:
             try:
                 return _flown(job, Path(place), link, threads=threads, trust=trust)
@@ -59,7 +59,7 @@ def serve_leader(
 
 def _flown(job: DivisionJob, place: Path, link: Link, *, threads: int, trust: bool) -> str:
     scenario = job.scenario(place, trust=trust)
-    with Simulation(scenario, threads=threads, share=job.share) as simulation:
+    with Simulation(scenario, threads=threads, partition=job.partition) as simulation:
 
         def connect(parts: object) -> Worker:
             worker = Worker(parts, link, job.repeated)  # type: ignore[arg-type]

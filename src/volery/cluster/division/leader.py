@@ -1,8 +1,8 @@
 """The leader's end of a divided run.
 
-Where the machines meet, it waits for what the workers have published, and passes it on; then it
+At a barrier it waits for what the workers have published, and passes it on; then it
 sends them what its own nodes have published and its clients have commanded, with the step of the
-next meeting. Where a worker's nodes may respond to that, the machines exchange again first.
+next barrier. Where a worker's nodes may respond to that, the machines exchange again first.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 import cbor2
 
+from volery.cluster.division.barriers import Barriers
 from volery.cluster.division.exchange import (
     CALL,
     COMMAND,
@@ -26,11 +27,12 @@ from volery.cluster.division.exchange import (
     state_hash,
 )
 from volery.cluster.division.link import Frame, Link, LinkError
-from volery.cluster.division.meetings import Meetings
 from volery.core.errors import DivisionError, GraphError, VoleryError
 from volery.graph.codecs.zero import zero_message
 from volery.runtime.division_parts import DivisionParts
 
+EARLY = "e"
+"""Kind of the frames that no batch answers."""
 _SIZE_BYTES = 4
 
 
@@ -43,34 +45,38 @@ class Member:
         """UAVs that it serves."""
         self.due = 0
         """Step at which something is due there."""
+        self.timers = False
+        """Whether timers are due there in the present tick."""
         self.topics: dict[str, Any] = {}
         """Type and latching of the topics that only it publishes."""
         self.subscribed: frozenset[str] = frozenset()
         """Topics with subscribers there, and ..."""
         self.reacts: frozenset[str] = frozenset()
         """... those with nodes among them."""
-        self.told: tuple[list[str], list[str]] | None = None
+        self.known_wishes: tuple[list[str], list[str]] | None = None
         """Topics that it knows to have subscribers, and external clients, elsewhere."""
         self.relayed: list[Item] = []
         """Items of other workers, to be sent."""
         self._history = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
-        self.num_sent = 0
-        """Frames sent since the start."""
+        self._num_sent = 0
+        self.num_answered = 0
+        """Frames sent since the start that a batch of the worker answers."""
 
     def send(self, *frame: Any) -> None:
         """Sends a frame, which a substitute will receive, too."""
         encoded = cbor2.dumps(frame)
         self._history.write(len(encoded).to_bytes(_SIZE_BYTES, "big") + encoded)
-        self.num_sent += 1
+        self._num_sent += 1
+        self.num_answered += frame[0] != EARLY
         self.link.send_bytes(encoded)
 
     def history(self) -> Iterator[bytes]:
         """Yields all frames so far."""
         self._history.seek(0)
-        for _ in range(self.num_sent):
+        for _ in range(self._num_sent):
             yield self._history.read(int.from_bytes(self._history.read(_SIZE_BYTES), "big"))
 
-    def heard(self, due: int, news: dict[str, Any]) -> None:
+    def update(self, due: int, news: dict[str, Any]) -> None:
         """Takes over what a worker tells of itself."""
         self.due = due
         self.topics = news.get("topics", self.topics)
@@ -99,7 +105,8 @@ class Leader:
         self._members = list(members)
         self._substitute = substitute
         self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
-        self._meetings = Meetings(parts)
+        self._barriers = Barriers(parts)
+        self._has_responses = self._has_timers = False
         self._seen_changes = -1
         self._exchanges = 0
         self._abandoned: list[str] = []
@@ -109,37 +116,66 @@ class Leader:
         self._note_wishes()
 
     @property
-    def meets(self) -> bool:
+    def at_barrier(self) -> bool:
         """Whether all machines are at the present step."""
-        return self._meetings.is_open
+        return self._barriers.is_open
 
     def begin_tick(self, last_step: int) -> int:
-        """At a meeting, sends what has happened here until no worker responds, and ends it."""
-        meetings = self._meetings
-        while meetings.is_open:
+        """At a barrier, sends what has happened here until no worker responds, and ends it."""
+        barriers = self._barriers
+        while barriers.is_open:
             own = self._outbox.flush()
             pending = {member: self._items_for(member, own) for member in self._members}
             news = self._news()
             final = not any(
                 news[member] or _may_respond(member, items) for member, items in pending.items()
             )
-            due = min([last_step, meetings.due_step(), *(member.due for member in self._members)])
+            due = min([last_step, barriers.due_step(), *(member.due for member in self._members)])
             next_step = max(due, self._engine.fleet.step)
             for member, items in pending.items():
                 frame = ["t", items, final, next_step, news[member]]
                 self._reach(member, partial(_send, frame))
             if final:
-                meetings.close(next_step)
+                barriers.close(next_step)
             else:
                 self._receive()
-        return min(last_step, meetings.next_step)
+        return min(last_step, barriers.next_step)
+
+    def exchange_responses(self) -> None:
+        """At a barrier, receives what the workers' nodes have responded.
+
+        If timers are due anywhere, passes it on before they are called; else it can wait.
+        """
+        if not self._barriers.is_due():
+            return
+        self._has_responses = True
+        self._send_early()
+        self._receive()
+        self._has_timers = self._barriers.has_timers() or any(m.timers for m in self._members)
+        if self._has_timers:
+            own = self._outbox.flush()
+            for member in tuple(self._members):
+                frame = ["a", self._items_for(member, own)]
+                self._reach(member, partial(_send, frame))
 
     def end_tick(self) -> None:
-        """At a meeting, receives and applies what the workers have published."""
-        if self._meetings.comes():
-            self._receive()
+        """At a barrier, receives what the workers' timers have caused."""
+        if self._has_responses or self._barriers.is_due():
+            if self._has_timers or not self._has_responses:
+                self._receive()
             self._hold_abandoned()
-            self._meetings.is_open = True
+            self._has_responses = self._has_timers = False
+            self._barriers.is_open = True
+
+    def _send_early(self) -> None:
+        """Sends what no worker responds to, so that they apply it while this machine waits."""
+        own = self._outbox.flush()
+        for member in tuple(self._members):
+            items = [item for item in own if _concerns(member, item)]
+            if _may_respond(member, items):
+                member.relayed += items
+            elif items:
+                self._reach(member, partial(_send, [EARLY, items]))
 
     def _receive(self) -> None:
         own_hash = state_hash(self._engine.fleet, self._exchanges)
@@ -148,8 +184,9 @@ class Leader:
             frame = self._reach(member, self._batch_of)
             if frame is None:
                 continue
-            _, items, due, their_hash, news = frame
-            member.heard(due, news)
+            _, items, due, timers, their_hash, news = frame
+            member.update(due, news)
+            member.timers = timers
             if their_hash != own_hash:
                 raise DivisionError(
                     f"{member.link.name} computes other states than this machine at "
@@ -182,7 +219,7 @@ class Leader:
         frame = member.link.receive()
         if frame[0] == "failed":
             raise _FailedError(f"{member.link.name}: {frame[1]}")
-        if frame[0] != "b" or len(frame) != 5:
+        if frame[0] != "b" or len(frame) != 6:
             raise LinkError(f"{member.link.name} sends a broken frame")
         return frame
 
@@ -230,8 +267,8 @@ class Leader:
             elsewhere = here.union(*others)
             wanted = [topic for topic in member.topics if topic in elsewhere]
             shown = [topic for topic in member.topics if topic in all_shown]
-            if (wanted, shown) != member.told:
-                member.told = wanted, shown
+            if (wanted, shown) != member.known_wishes:
+                member.known_wishes = wanted, shown
                 found[member] = [wanted, shown]
         return found
 

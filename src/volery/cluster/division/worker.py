@@ -1,12 +1,12 @@
-"""A worker's end of a divided run: it follows the leader, from meeting to meeting."""
+"""A worker's end of a divided run: it follows the leader, from barrier to barrier."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from volery.cluster.division.barriers import Barriers
 from volery.cluster.division.exchange import Inbox, Outbox, state_hash
-from volery.cluster.division.link import Link, LinkError
-from volery.cluster.division.meetings import Meetings
+from volery.cluster.division.link import Frame, Link, LinkError
 from volery.core.errors import VoleryError
 from volery.runtime.division_parts import DivisionParts
 
@@ -18,7 +18,7 @@ class RunEndedError(VoleryError):
 class Worker:
     """Implements an engine's `Division` on a worker.
 
-    repeated: number of the leader's frames that a lost worker has answered already.
+    repeated: number of the leader's frames that a lost worker has received, but the early ones.
     """
 
     def __init__(self, parts: DivisionParts, link: Link, repeated: int = 0) -> None:
@@ -26,29 +26,33 @@ class Worker:
         self._nodes = parts.nodes
         self._link = link
         self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
-        self._meetings = Meetings(parts)
+        self._barriers = Barriers(parts)
+        self._has_responses = self._has_timers = False
+        self._waiting: Frame | None = None
+        """Frame that begins the next tick."""
         self._left_to_repeat = repeated
-        self._told: dict[str, Any] = {}
+        self._announced: dict[str, Any] = {}
         self._seen_changes = -1
         self._exchanges = 0
 
     def greet(self) -> None:
         """Sends what the leader must know before the first tick."""
-        self._link.send("ready", self._meetings.due_step(), self._news())
+        self._link.send("ready", self._barriers.due_step(), self._news())
 
     @property
-    def meets(self) -> bool:
+    def at_barrier(self) -> bool:
         """Whether all machines are at the present step."""
-        return self._meetings.is_open
+        return self._barriers.is_open
 
     def begin_tick(self, last_step: int) -> int:
-        """At a meeting, takes over what has happened elsewhere, until the leader ends it.
+        """At a barrier, takes over what has happened elsewhere, until the leader ends it.
 
         Raises `RunEndedError` when the leader ends the run.
         """
-        meetings = self._meetings
-        while meetings.is_open:
-            kind, *rest = self._link.receive()
+        barriers = self._barriers
+        while barriers.is_open:
+            kind, *rest = self._waiting or self._link.receive()
+            self._waiting = None
             if kind == "end":
                 raise RunEndedError(str(rest[0]))
             if kind != "t" or len(rest) != 4:
@@ -56,20 +60,40 @@ class Worker:
             items, final, next_step, wishes = rest
             self._left_to_repeat = max(0, self._left_to_repeat - 1)
             if wishes is not None:
-                self._outbox.want(frozenset(wishes[0]), frozenset(self._told.get("topics", ())))
+                known = frozenset(self._announced.get("topics", ()))
+                self._outbox.want(frozenset(wishes[0]), known)
                 self._outbox.show_externally(wishes[1])
             self._inbox.apply(items)
             if final:
-                meetings.close(int(next_step))
+                barriers.close(int(next_step))
             else:
                 self._send()
-        return min(last_step, meetings.next_step)
+        return min(last_step, barriers.next_step)
+
+    def exchange_responses(self) -> None:
+        """At a barrier, sends what the nodes here have responded, and waits for the others."""
+        if not self._barriers.is_due():
+            return
+        self._has_responses = True
+        self._send()
+        frame = self._link.receive()
+        while frame[0] == "e":
+            self._inbox.apply(frame[1])
+            frame = self._link.receive()
+        if frame[0] != "a":  # no timers anywhere: the next tick begins
+            self._waiting = frame
+            return
+        self._has_timers = True
+        self._left_to_repeat = max(0, self._left_to_repeat - 1)
+        self._inbox.apply(frame[1])
 
     def end_tick(self) -> None:
-        """At a meeting, sends what has been published here."""
-        if self._meetings.comes():
-            self._send()
-            self._meetings.is_open = True
+        """At a barrier, sends what timers have caused here."""
+        if self._has_responses or self._barriers.is_due():
+            if self._has_timers or not self._has_responses:
+                self._send()
+            self._has_responses = self._has_timers = False
+            self._barriers.is_open = True
 
     def end_round(self) -> None:
         """Does nothing: a worker has no clients."""
@@ -80,7 +104,8 @@ class Worker:
         own_hash = state_hash(self._engine.fleet, self._exchanges)
         self._exchanges += 1
         if not self._left_to_repeat:
-            self._link.send("b", items, self._meetings.due_step(), own_hash, self._news())
+            due, timers = self._barriers.due_step(), self._barriers.has_timers()
+            self._link.send("b", items, due, timers, own_hash, self._news())
 
     def _news(self) -> dict[str, Any]:
         """Returns the topics published and needed here, if they have changed."""
@@ -93,7 +118,7 @@ class Worker:
             "subscribed": sorted(self._graph.subscribed_topics()),
             "reacts": sorted(reacts),
         }
-        if found == self._told:
+        if found == self._announced:
             return {}
-        self._told = found
+        self._announced = found
         return found

@@ -16,12 +16,12 @@ from pathlib import Path
 from volery.cluster.division.job import DivisionJob, files_of
 from volery.cluster.division.leader import Leader, Member, greeting_of
 from volery.cluster.division.link import Link, LinkError, admit
-from volery.cluster.division.partition import divided
+from volery.cluster.division.partitioning import divided
 from volery.cluster.runs import code_version
 from volery.core.errors import DivisionError, reason_of
 from volery.core.machine import describe_versions, usable_cores
 from volery.engine.engine import Division
-from volery.runtime.build.share import Share
+from volery.runtime.build.partition import Partition
 from volery.runtime.division_parts import DivisionParts
 from volery.scenario.schema import Scenario
 
@@ -60,10 +60,10 @@ class Workers:
         self,
         options: DivisionOptions,
         scenario: Scenario,
-        tell: Callable[[str], None],
+        show: Callable[[str], None],
         is_stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._options, self._scenario, self._tell = options, scenario, tell
+        self._options, self._scenario, self._show = options, scenario, show
         self._is_stopped = is_stopped
         self._token = options.token or secrets.token_urlsafe(24)
         self._versions = {"volery's code": code_version(), **describe_versions()}
@@ -85,8 +85,8 @@ class Workers:
         host, port = self._listener.getsockname()[:2]
         return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
-    def gather(self) -> Share:
-        """Waits for all workers and hands out their parts; returns the leader's share.
+    def gather(self) -> Partition:
+        """Waits for all workers and hands out their parts; returns the leader's partition.
 
         Raises `DivisionError` for a scenario that cannot be divided.
         """
@@ -95,12 +95,12 @@ class Workers:
         self._members = [Member(*pair) for pair in zip(links, shares[1:], strict=True)]
         for member in self._members:
             self._hand_out(member.link, member.uavs, is_here=self._options.listen is None)
-        return Share(named=frozenset().union(*shares[1:]))
+        return Partition(named=frozenset().union(*shares[1:]))
 
     def connect(self, parts: DivisionParts) -> Division:
         """Waits until all workers are ready; returns the connection of the leader to them."""
         for member in self._members:
-            member.heard(*greeting_of(member.link))
+            member.update(*greeting_of(member.link))
         self._leader = Leader(parts, self._members, self._substitute)
         return self._leader
 
@@ -122,13 +122,13 @@ class Workers:
 
     def _await_others(self) -> list[Link]:
         count = self._options.workers
-        self._tell(f"waiting for {count} workers: volery worker --join {self.address}")
+        self._show(f"waiting for {count} workers: volery worker --join {self.address}")
         links: list[Link] = []
         while len(links) < count:
             link = self._admitted(f"worker {len(links) + 1}")
             if link is not None:
                 links.append(link)
-                self._tell(f"{link.name} has joined")
+                self._show(f"{link.name} has joined")
             if self._is_stopped():
                 raise DivisionError("stopped while waiting for workers")
         return links
@@ -158,7 +158,7 @@ class Workers:
         try:
             admit(link, self._token, self._versions)
         except LinkError as error:
-            self._tell(str(error))
+            self._show(str(error))
             link.close()
             return None
         link.show_life()
@@ -182,16 +182,16 @@ class Workers:
     def _substitute(self, lost: Member, reason: str) -> Link | None:
         """Has the part of a lost worker repeated here; see `leader.Substitute`."""
         if self._options.drop:
-            self._tell(f"{reason}; {_listed(lost.uavs)} go on without their nodes and sensors")
+            self._show(f"{reason}; {_listed(lost.uavs)} go on without their nodes and sensors")
             return None
-        self._tell(f"{reason}; this machine repeats its part so far and takes it over")
+        self._show(f"{reason}; this machine repeats its part so far and takes it over")
         start = time.monotonic()
         link = self._started_here(threads=1)
-        self._hand_out(link, lost.uavs, lost.num_sent, is_here=True)
+        self._hand_out(link, lost.uavs, lost.num_answered, is_here=True)
         greeting_of(link)
         for frame in lost.history():
             link.send_bytes(frame)
-        self._tell(f"{_listed(lost.uavs)}: taken over after {time.monotonic() - start:.1f} s")
+        self._show(f"{_listed(lost.uavs)}: taken over after {time.monotonic() - start:.1f} s")
         return link
 
 

@@ -10,10 +10,10 @@ from volery.control.fleet import Fleet
 from volery.engine.engine import SensorBank
 from volery.runtime.build.estimation import build_estimation
 from volery.runtime.build.fleet import add_bodies, build_fleet
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors
 from volery.runtime.build.sensors import build_banks
-from volery.runtime.build.share import WHOLE, Share
 from volery.scenario.schema import Scenario
 from volery.world.scene import Scene
 
@@ -32,11 +32,11 @@ class Assembly:
 
 
 def assemble(
-    scenario: Scenario, starts: Sequence[StartPose], scene: Scene, share: Share = WHOLE
+    scenario: Scenario, starts: Sequence[StartPose], scene: Scene, partition: Partition = WHOLE
 ) -> Assembly:
     """Builds the UAVs of `starts` and replaces the bodies in `scene` by theirs.
 
-    share: the UAVs whose LIDARs and cameras get a bank.
+    partition: the UAVs whose LIDARs and cameras get a bank.
 
     Raises `ScenarioError` or `DataFileError` if a part cannot be built; the scene is then
     unchanged.
@@ -44,6 +44,6 @@ def assemble(
     fleet = build_fleet(scenario, starts, tuple(start.name for start in starts))
     fitted = fit_sensors(scenario, starts)
     estimation = build_estimation(scenario, fitted, fleet)
-    banks = build_banks(scenario, fitted, fleet, scene, estimation, share)
+    banks = build_banks(scenario, fitted, fleet, scene, estimation, partition)
     add_bodies(scene, starts)
     return Assembly(fleet, fitted, banks, estimation)

@@ -11,8 +11,8 @@ from volery.graph.graph import Graph
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import Assembly, assemble
 from volery.runtime.build.fleet import place
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.placement import StartPose
-from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.build.worlds import BuiltWorld
 from volery.runtime.monitoring.output_sink import OutputSink
 from volery.scenario.schema import Scenario
@@ -30,11 +30,11 @@ class ConnectedEngine(NamedTuple):
 
 
 def build_engine(
-    scenario: Scenario, world: BuiltWorld, pacer: Pacer, share: Share = WHOLE
+    scenario: Scenario, world: BuiltWorld, pacer: Pacer, partition: Partition = WHOLE
 ) -> ConnectedEngine:
     """Returns an engine whose runs `pacer` paces. Raises `ScenarioError`, `DataFileError`."""
     starts = place(scenario, world.scene, world.terrain)
-    assembly = assemble(scenario, starts, world.scene, share)
+    assembly = assemble(scenario, starts, world.scene, partition)
     commands = CommandQueue(on_post=pacer.wake)
     graph = Graph(lambda: engine.time_ns, commands.post)
     publisher = GraphPublisher(graph)

@@ -18,9 +18,9 @@ from volery.graph.nodes.node import Context, Node
 from volery.publishing.camera_messages import Camera
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.node_loading import start_node
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import RESULT_OF, SensorInstance
-from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.camera import CameraSensor
 from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
@@ -28,11 +28,11 @@ from volery.sensors.samples import JointAngles
 
 
 def announce_sensors(
-    publisher: GraphPublisher, fitted: Sequence[SensorInstance], share: Share = WHOLE
+    publisher: GraphPublisher, fitted: Sequence[SensorInstance], partition: Partition = WHOLE
 ) -> None:
-    """Advertises the topics of the sensors; `share` of a divided run samples its own."""
+    """Advertises the topics of the sensors; `partition` of a divided run samples its own."""
     for sensor in fitted:
-        local = share.serves(sensor.id.uav_name)
+        local = partition.serves(sensor.id.uav_name)
         if sensor.lidar is not None:
             publisher.announce_lidar(
                 sensor.id, sensor.lidar, sensor.topic, sensor.mount, local=local

@@ -13,8 +13,8 @@ from volery.core.clock import Schedule, ns_from_s
 from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.build.geo_reference import denial, local_frame, magnetic_field_map
+from volery.runtime.build.partition import DIVIDED_SENSORS, WHOLE, Partition
 from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstance
-from volery.runtime.build.share import DIVIDED_SENSORS, WHOLE, Share
 from volery.runtime.build.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank, SensorGroup
@@ -45,20 +45,22 @@ def build_banks(
     fleet: Fleet,
     scene: Scene,
     estimation: Estimation | None = None,
-    share: Share = WHOLE,
+    partition: Partition = WHOLE,
 ) -> list[SensorBank]:
     """Returns the banks in a fixed order; estimates come last, after their inputs.
 
-    share: the UAVs whose LIDARs and cameras are sampled here.
+    partition: the UAVs whose LIDARs and cameras are sampled here.
     """
     groups: dict[tuple[Any, ...], list[SensorInstance]] = defaultdict(list)
     for sensor in sorted(fitted, key=lambda sensor: sensor.spec.kind == "estimate"):
-        if sensor.spec.kind not in DIVIDED_SENSORS or share.serves(sensor.id.uav_name):
-            groups[sensor.bank_key].append(sensor)
+        own = groups[sensor.bank_key]  # the order of the banks is that of all sensors
+        if sensor.spec.kind not in DIVIDED_SENSORS or partition.serves(sensor.id.uav_name):
+            own.append(sensor)
     builder = _Builder(scenario, fleet, scene, estimation)
     banks: list[SensorBank] = [
         FaultableBank(builder.build(group), RESULT_OF[group[0].spec.kind].MEASURED)
         for group in groups.values()
+        if group
     ]
     nodding = [sensor for sensor in fitted if sensor.mount.nods]
     if nodding:

@@ -12,7 +12,7 @@ from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
 from volery.runtime.build.engine import ConnectedEngine
 from volery.runtime.build.line_of_sight import LineOfSight
-from volery.runtime.build.share import WHOLE, Share
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.worlds import BuiltWorld
 from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.vehicles.manager import VehicleManager
@@ -25,7 +25,7 @@ def build_vehicles(
     connected: ConnectedEngine,
     world: BuiltWorld,
     runs: ConditionalRuns,
-    share: Share = WHOLE,
+    partition: Partition = WHOLE,
 ) -> VehicleManager:
     """Returns the manager of the engine's vehicles, which are not on the graph yet."""
     engine, graph = connected.engine, connected.graph
@@ -41,7 +41,7 @@ def build_vehicles(
         world.terrain,
         runs,
         radio,
-        share,
+        partition,
     )
 
 

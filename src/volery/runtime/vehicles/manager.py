@@ -25,9 +25,9 @@ from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import Assembly, assemble
 from volery.runtime.build.fleet import add_bodies
 from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
+from volery.runtime.build.partition import WHOLE, Partition
 from volery.runtime.build.placement import StartPose, check_room
 from volery.runtime.build.sensor_suites import SensorInstance, refit
-from volery.runtime.build.share import WHOLE, Share
 from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.services.uav_services import offer_uav_services
@@ -81,7 +81,7 @@ class VehicleManager:
     runs: ConditionalRuns
     """Runs for code that waits for flight commands and samples."""
     radio: RadioNetwork | None = None
-    share: Share = WHOLE
+    partition: Partition = WHOLE
     """UAVs whose LIDARs, cameras and nodes exist here."""
     fitted: list[SensorInstance] = field(default_factory=list)
     uavs: UavTable = field(default_factory=UavTable)
@@ -126,7 +126,7 @@ class VehicleManager:
             raise CommandError("UAVs are spawned and deleted between ticks; use post()")
         if not starts:
             raise CommandError("a simulation needs at least one UAV")
-        parts = assemble(self.scenario, starts, self.engine.scene, self.share)
+        parts = assemble(self.scenario, starts, self.engine.scene, self.partition)
         undo = UndoSteps()
 
         def undo_all() -> None:
@@ -142,11 +142,11 @@ class VehicleManager:
     def start_nodes(self) -> None:
         """Starts the nodes of UAVs without nodes, and those of the system if none runs."""
         served = {node.get_namespace() for node in self.nodes}
-        own = [start for start in self.starts if self.share.serves(start.name)]
+        own = [start for start in self.starts if self.partition.serves(start.name)]
         alone = [start for start in own if f"/{start.name}" not in served]
         now_ns = self._now_ns
         self.nodes += start_nodes(self.scenario, alone, self.graph, self.engine, now_ns)
-        if _ROOT not in served and self.share.is_leader:
+        if _ROOT not in served and self.partition.is_leader:
             self.nodes += start_system_nodes(self.scenario, self.graph, self.engine, now_ns)
         order = {f"/{start.name}": row for row, start in enumerate(self.starts)}
         self.nodes.sort(key=lambda node: order.get(node.get_namespace(), len(order)))
@@ -260,7 +260,7 @@ class VehicleManager:
         opened.add(partial(self.outlet.latest.forget, name))
         opened.add(partial(self.publisher.retire, name))
         own = [f for f in fitted if f.id.uav_name == name]
-        announce_sensors(self.publisher, own, self.share)
+        announce_sensors(self.publisher, own, self.partition)
 
     def _new_uav(self, start: StartPose, fleet: Fleet, row: int) -> Uav:
         return Uav(

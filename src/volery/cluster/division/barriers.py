@@ -1,8 +1,9 @@
-"""When the machines of a divided run meet.
+"""Barriers: when the machines of a divided run exchange what they publish.
 
-Between two meetings each machine runs by itself, in ticks of its own. They meet at the next step at
+Between two barriers each machine runs by itself, in ticks of its own. They meet at the next step at
 which a node may act anywhere: when a sensor measures whose messages are delivered, a timer is due,
-or an event has happened. All compute the same events, so all stop for them.
+or an event has happened. All compute the same events, so all stop for them. A barrier has up to two
+exchanges: of responses to sensors' messages, and of what timers have caused then.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from volery.runtime.division_parts import DivisionParts
 _FAR = 1 << 62
 
 
-class Meetings:
-    """The meetings as one machine sees them."""
+class Barriers:
+    """The barriers as one machine sees them."""
 
     def __init__(self, parts: DivisionParts) -> None:
         self._engine, self._graph = parts.engine, parts.graph
         self._has_receivers = parts.has_receivers
-        self._heard: dict[int, bool] = {}
+        self._active: dict[int, bool] = {}
         """Whether messages of a bank are delivered, by the bank's `id`."""
         self._seen_changes = -1
         self._events = 0
@@ -28,18 +29,23 @@ class Meetings:
         """Whether the machines are at one step and have exchanged what came before."""
 
     def close(self, next_step: int) -> None:
-        """Ends a meeting; the next one is at `next_step`, or after an event."""
+        """Ends a barrier; the next one is at `next_step`, or after an event."""
         self.is_open, self._next = False, next_step
         self._events = self._engine.num_events
 
-    def comes(self) -> bool:
+    def is_due(self) -> bool:
         """Returns whether the machines meet at the end of this tick."""
         here = self._engine.fleet.step >= self._next
         return here or self._engine.num_events != self._events
 
+    def has_timers(self) -> bool:
+        """Returns whether timers are due on this machine in the present tick."""
+        due = (self._engine.timer_agenda.next_step(), self._engine.deadlines.next_step())
+        return any(step is not None and step <= self._engine.fleet.step for step in due)
+
     @property
     def next_step(self) -> int:
-        """Step of the next meeting, unless an event comes first."""
+        """Step of the next barrier, unless an event comes first."""
         return self._next
 
     def due_step(self) -> int:
@@ -47,17 +53,17 @@ class Meetings:
         engine = self._engine
         if self._graph.changes != self._seen_changes:
             self._seen_changes = self._graph.changes
-            self._heard.clear()
+            self._active.clear()
         steps = (
-            engine.sensor_agenda.next_step_of(self._is_heard),
+            engine.sensor_agenda.next_step_of(self._is_active),
             engine.timer_agenda.next_step(),
             engine.partner_agenda.next_step(),
             engine.deadlines.next_step(),
         )
         return min((step for step in steps if step is not None), default=_FAR)
 
-    def _is_heard(self, bank: SensorBank) -> bool:
-        found = self._heard.get(id(bank))
+    def _is_active(self, bank: SensorBank) -> bool:
+        found = self._active.get(id(bank))
         if found is None:
-            found = self._heard[id(bank)] = self._has_receivers(bank)
+            found = self._active[id(bank)] = self._has_receivers(bank)
         return found

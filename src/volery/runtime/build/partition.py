@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Share:
-    """A leader's share: all UAVs but some; a worker's: some. By default, the whole run."""
+class Partition:
+    """A leader's partition is all UAVs but some, a worker's is some; the default is all UAVs."""
 
     is_leader: bool = True
     """Whether the machine also runs the nodes of the whole system, and serves new UAVs."""
@@ -23,6 +23,6 @@ class Share:
         return (uav in self.named) != self.is_leader
 
 
-WHOLE = Share()
+WHOLE = Partition()
 DIVIDED_SENSORS = ("lidar", "camera")
 """Kinds of sensors that one machine samples for all others."""
