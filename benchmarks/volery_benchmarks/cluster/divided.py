@@ -27,9 +27,14 @@ _FLIGHTS: dict[str, _Flight] = {
     "split": ("forest_survey", {"uavs[0].count": 40}, 4.0, 10.0),
     "split_cameras": (
         "obstacle_field",
-        {"uavs[0].count": 8, "uavs[0].last_position_m": [-35.0, 0.0]},
+        {
+            "uavs[0].count": 8,
+            "uavs[0].last_position_m": [-35.0, 0.0],
+            "types.scout.sensors[0].width": 320,
+            "types.scout.sensors[0].height": 240,
+        },
         3.0,
-        4.0,
+        5.0,
     ),
 }
 """Scenario, its changes, simulated s before and during the measurement."""
