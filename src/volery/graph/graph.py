@@ -151,6 +151,11 @@ class Graph:
         """Registers a node by its full name."""
         self.parameters.enter(node)
 
+    def count_change(self) -> None:
+        """Counts a change of what some publisher's `has_subscribers` depends on."""
+        with self._members:
+            self.changes += 1
+
     # ---------------------------------------------------------------------------------- topics
 
     def is_recorded(self, topic: str) -> bool:
@@ -255,10 +260,10 @@ class Graph:
         """
         listener = _Listener(callback, matches or _match_all)
         self._to_all.append(listener)
-        self.changes += 1
+        self.count_change()
         meant = [topic for topic in self._topics.values() if listener.matches(topic.name)]
         self._send_latched(meant, listener)
-        return Subscription(self._to_all, listener, self._count_change)
+        return Subscription(self._to_all, listener, self.count_change)
 
     def topics(self) -> list[TopicInfo]:
         """Returns all topics, sorted by name."""
@@ -434,13 +439,10 @@ class Graph:
         finally:
             self._queue.extend(reversed(after))
 
-    def _count_change(self) -> None:
-        self.changes += 1
-
     def _drop_unused(self, topic: Topic) -> None:
         """Removes the oldest unused topic when there are more than MOST_UNUSED."""
-        self.changes += 1
         with self._members:
+            self.changes += 1
             if topic.used:
                 return
             if self._topics.get(topic.name) is not topic:

@@ -36,6 +36,7 @@ class Weaver(Node):
         self.create_subscription(Image, "eye/depth", self.on_image, 5)
         self.create_subscription(Odometry, "odom", self.on_odometry, 5)
         self.create_subscription(String, "orders", self.on_order, 5)
+        self.create_service("std_srvs/srv/Trigger", "~/dance", self.on_dance)
         self.words.publish(String("hello"))
         self.ordered = self.climb = 0.0
         self.create_timer(0.04, self.on_timer)
@@ -47,6 +48,11 @@ class Weaver(Node):
     def on_scan(self, scan):
         finite = scan.ranges[np.isfinite(scan.ranges)]
         self.seen = float(finite.sum()) if len(finite) else 0.0
+
+    def on_dance(self, _request, response):
+        self.ordered += 0.5
+        response.success, response.message = True, f"{self.get_namespace()} dances"
+        return response
 
     def on_image(self, image):
         depth = np.frombuffer(image.data, np.float32)

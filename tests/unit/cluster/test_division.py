@@ -67,6 +67,32 @@ def test_commands_of_clients_reach_the_nodes_and_uavs_of_workers():
     assert alone != quiet
 
 
+def test_services_of_nodes_on_workers_respond_to_clients():
+    answers = []
+
+    def act(simulation):
+        session = simulation.gateway.open("pilot 7")
+        reply = ServiceReply(answers.append, answers.append)
+        session.call("/uav3/weaver/dance", None, reply)
+
+    alone, together = both(scenario_of(), act)
+    assert together == alone
+    assert [answer.message for answer in answers] == ["/uav3 dances"] * 6
+
+
+def test_services_of_lost_workers_fail():
+    failures = []
+    with DividedPair(scenario_of(), on_loss=lambda *_: None) as pair:
+        pair.simulation.run(0.1)
+        assert "/uav3/weaver/dance" in pair.simulation.graph.services()
+        session = pair.simulation.gateway.open("pilot 7")
+        session.call("/uav3/weaver/dance", None, ServiceReply(failures.append, failures.append))
+        pair.member.link.close()
+        pair.simulation.run(0.1)
+        assert "/uav3/weaver/dance" not in pair.simulation.graph.services()
+    assert [str(each) for each in failures] == ["service '/uav3/weaver/dance': its worker is lost"]
+
+
 def test_a_reset_by_a_client_resets_all_machines():
     def act(simulation):
         session = simulation.gateway.open("pilot 7")

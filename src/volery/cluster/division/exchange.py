@@ -7,14 +7,14 @@ commands of its clients. Another machine applies them at the same simulated time
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from volery.control.fleet import Fleet
-from volery.core.errors import GraphError
+from volery.core.errors import GraphError, VoleryError
 from volery.graph import command_records as records
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.graph import Graph
@@ -24,13 +24,14 @@ from volery.graph.session import ClientCommand
 from volery.graph.topics import Publisher, Subscription
 from volery.runtime.division_parts import DivisionParts
 
-_HASHED_TICKS = 32
+_HASH_PERIOD = 32
+"""Exchanges from one comparison of states to the next."""
 
 Item = list[Any]
 """An item: its kind and what belongs to it."""
-MESSAGE, EXTERNAL, CALL, COMMAND, ROUND = "m", "e", "s", "k", "r"
+MESSAGE, EXTERNAL, CALL, COMMAND, ROUND, ANSWER = "m", "e", "s", "k", "r", "w"
 """A message; one for external clients only; a service call of a node; a command of a client; the
-end of a round of commands, whose messages are delivered then."""
+end of a round of commands, whose messages are delivered then; a node's response to a client."""
 
 
 class Outbox:
@@ -54,7 +55,7 @@ class Outbox:
         those on all topics are.
         """
         self._wanted, self._declared = wanted, declared
-        self._graph.changes += 1
+        self._graph.count_change()
 
     def flush(self) -> list[Item]:
         """Returns the items since the last call."""
@@ -74,6 +75,10 @@ class Outbox:
         client, kind, name, msgtype, _, latched, request = taken
         content = records.content_bytes(taken)
         self._items.append([COMMAND, client, kind, name, msgtype, content, latched, request])
+
+    def answer(self, service: str, cdr: bytes, failure: str = "") -> None:
+        """Adds the response of a node's service to a client, or why there is none."""
+        self._items.append([ANSWER, service, cdr, failure])
 
     def end_round(self) -> None:
         """Adds the end of a round of commands."""
@@ -111,10 +116,15 @@ class Outbox:
 
 
 class Inbox:
-    """Applies the items of other machines."""
+    """Applies the items of other machines; `outbox` receives responses of nodes' services."""
 
-    def __init__(self, parts: DivisionParts) -> None:
+    def __init__(self, parts: DivisionParts, outbox: Outbox) -> None:
         self._graph = parts.graph
+        self._outbox = outbox
+        self.node_services: Collection[str] = frozenset()
+        """Services of nodes of this machine, whose responses go back."""
+        self.on_answer: Callable[[str, bytes, str], None] = lambda *_: None
+        """Receives name, response and failure of a call of a service on another machine."""
         self._repeater = parts.repeater
         self._publishers: dict[str, Publisher] = {}
 
@@ -142,11 +152,32 @@ class Inbox:
             if kind == ROUND:
                 self._graph.deliver()
             elif kind == COMMAND:
-                self._repeater.repeat(_command_of(rest))
+                self._command(_command_of(rest))
+            elif kind == ANSWER:
+                self.on_answer(*rest)
             elif kind == CALL:
                 self._call(*rest)
             else:
                 self._publish(*rest, externally=kind == EXTERNAL)
+
+    def _command(self, taken: ClientCommand) -> None:
+        if taken.kind == "call" and taken.name in self.node_services:
+            self._serve(taken)
+        else:
+            self._repeater.repeat(taken)
+
+    def _serve(self, taken: ClientCommand) -> None:
+        """Calls a service of a node for a client of the leader."""
+        name, outbox = taken.name, self._outbox
+        reply = ServiceReply(
+            lambda answer: outbox.answer(name, encode_cdr(answer, f"{taken.type}_Response")),
+            lambda error: outbox.answer(name, b"", str(error)),
+        )
+        try:
+            with self._graph.on_behalf_of(taken.client):
+                self._graph.call_async(name, taken.content, reply)
+        except VoleryError as error:
+            reply.fail(GraphError(str(error)))
 
     def _publish(self, topic: str, msgtype: str, cdr: bytes, *, externally: bool) -> None:
         if topic not in self._publishers:
@@ -165,9 +196,9 @@ class Inbox:
         self._graph.deliver()
 
 
-def state_hash(fleet: Fleet, tick: int) -> bytes:
-    """Returns a hash of all positions, attitudes and velocities; empty in most ticks."""
-    if tick % _HASHED_TICKS:
+def state_hash(fleet: Fleet, exchange: int) -> bytes:
+    """Returns a hash of all positions, attitudes and velocities; empty in most exchanges."""
+    if exchange % _HASH_PERIOD:
         return b""
     state = fleet.state
     digest = hashlib.blake2b(digest_size=8)

@@ -27,6 +27,7 @@ from volery.cluster.division.exchange import (
     state_hash,
 )
 from volery.cluster.division.link import Frame, Link, LinkError
+from volery.cluster.division.node_services import NodeServices
 from volery.core.errors import DivisionError, GraphError, VoleryError
 from volery.graph.codecs.zero import zero_message
 from volery.runtime.division_parts import DivisionParts
@@ -49,6 +50,8 @@ class Member:
         """Whether timers are due there in the present tick."""
         self.topics: dict[str, Any] = {}
         """Type and latching of the topics that only it publishes."""
+        self.services: dict[str, str] = {}
+        """Types of the services of its nodes by name."""
         self.subscribed: frozenset[str] = frozenset()
         """Topics with subscribers there, and ..."""
         self.reacts: frozenset[str] = frozenset()
@@ -79,8 +82,8 @@ class Member:
     def update(self, due: int, news: dict[str, Any]) -> None:
         """Takes over what a worker tells of itself."""
         self.due = due
-        self.topics = news.get("topics", self.topics)
-        if "subscribed" in news:
+        if news:
+            self.topics, self.services = news["topics"], news["services"]
             self.subscribed = frozenset(news["subscribed"])
             self.reacts = frozenset(news["reacts"])
 
@@ -104,7 +107,10 @@ class Leader:
         self._engine, self._graph = parts.engine, parts.graph
         self._members = list(members)
         self._substitute = substitute
-        self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
+        self._outbox = Outbox(parts.graph)
+        self._inbox = Inbox(parts, self._outbox)
+        self._node_services = NodeServices(parts.graph)
+        self._inbox.on_answer = self._node_services.answer
         self._barriers = Barriers(parts)
         self._has_responses = self._has_timers = False
         self._seen_changes = -1
@@ -112,8 +118,7 @@ class Leader:
         self._abandoned: list[str] = []
         parts.commands.on_noted = self._outbox.command
         for member in self._members:
-            self._inbox.declare(member.topics)
-        self._note_wishes()
+            self._take_news(member)
 
     @property
     def at_barrier(self) -> bool:
@@ -192,10 +197,8 @@ class Leader:
                     f"{member.link.name} computes other states than this machine at "
                     f"{self._engine.time_ns / 1e9:.3f} s: their processors or libraries differ"
                 )
-            if "topics" in news:
-                self._inbox.declare(member.topics)
             if news:
-                self._note_wishes()
+                self._take_news(member)
             self._inbox.apply(items)
             for other in self._members:
                 if other is not member:
@@ -233,6 +236,7 @@ class Leader:
                 if link is None:
                     self._members.remove(member)
                     self._abandoned += sorted(member.uavs)
+                    self._node_services.withdraw(member.services)
                     member.close()
                     return None
                 member.link.close()
@@ -272,8 +276,10 @@ class Leader:
                 found[member] = [wanted, shown]
         return found
 
-    def _note_wishes(self) -> None:
-        """Collects what workers need."""
+    def _take_news(self, member: Member) -> None:
+        """Offers what a worker offers, and collects what workers need."""
+        self._inbox.declare(member.topics)
+        self._node_services.offer(member.link.name, member.services)
         self._outbox.want(frozenset().union(*(m.subscribed for m in self._members)))
         self._seen_changes = -1
 

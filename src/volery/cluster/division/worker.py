@@ -25,7 +25,8 @@ class Worker:
         self._engine, self._graph = parts.engine, parts.graph
         self._nodes = parts.nodes
         self._link = link
-        self._outbox, self._inbox = Outbox(parts.graph), Inbox(parts)
+        self._outbox = Outbox(parts.graph)
+        self._inbox = Inbox(parts, self._outbox)
         self._barriers = Barriers(parts)
         self._has_responses = self._has_timers = False
         self._waiting: Frame | None = None
@@ -112,11 +113,14 @@ class Worker:
         if self._graph.changes == self._seen_changes:
             return {}
         self._seen_changes = self._graph.changes
-        reacts = frozenset().union(*(node.endpoints().subscribes for node in self._nodes()))
+        ends = [node.endpoints() for node in self._nodes()]
+        served = sorted(frozenset().union(*(each.serves for each in ends)))
+        self._inbox.node_services = frozenset(served)
         found = {
+            "services": {name: self._graph.service_type(name) for name in served},
             "topics": {name: list(of) for name, of in self._graph.local_topics().items()},
             "subscribed": sorted(self._graph.subscribed_topics()),
-            "reacts": sorted(reacts),
+            "reacts": sorted(frozenset().union(*(each.subscribes for each in ends))),
         }
         if found == self._announced:
             return {}

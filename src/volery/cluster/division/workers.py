@@ -53,7 +53,7 @@ class DivisionOptions:
 class Workers:
     """Workers of one run. Use it as a context manager.
 
-    tell: shows a line to the user. is_stopped: returns whether to stop waiting for workers.
+    show: shows a line to the user. is_stopped: returns whether to stop waiting for workers.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class Workers:
         links = self._start() if self._options.listen is None else self._await_others()
         self._members = [Member(*pair) for pair in zip(links, shares[1:], strict=True)]
         for member in self._members:
-            self._hand_out(member.link, member.uavs, is_here=self._options.listen is None)
+            self._hand_out(member.link, member.uavs)
         return Partition(named=frozenset().union(*shares[1:]))
 
     def connect(self, parts: DivisionParts) -> Division:
@@ -164,11 +164,9 @@ class Workers:
         link.show_life()
         return link
 
-    def _hand_out(
-        self, link: Link, uavs: frozenset[str], repeated: int = 0, *, is_here: bool
-    ) -> None:
+    def _hand_out(self, link: Link, uavs: frozenset[str], repeated: int = 0) -> None:
         """Sends a worker its part."""
-        access = self._scenario.access
+        access, is_here = self._scenario.access, self._options.listen is None
         folder = str((access.folder or Path()).resolve()) if is_here else ""
         job = DivisionJob(
             self._scenario.model_dump(exclude_unset=True, mode="json"),
@@ -187,7 +185,7 @@ class Workers:
         self._show(f"{reason}; this machine repeats its part so far and takes it over")
         start = time.monotonic()
         link = self._started_here(threads=1)
-        self._hand_out(link, lost.uavs, lost.num_answered, is_here=True)
+        self._hand_out(link, lost.uavs, lost.num_answered)
         greeting_of(link)
         for frame in lost.history():
             link.send_bytes(frame)
