@@ -117,6 +117,7 @@ def test_workers_join_from_elsewhere(start, couple):
     assert stranger.returncode == 2
     assert "was refused: the token is wrong" in leader.stdout.readline()
     worker = start("worker", "--join", address, token="a")
+    assert "worker 1 (127.0.0.1) has joined" in leader.stdout.readline()
     output = ended(leader)
     assert ended(worker).splitlines() == ["joined: serves 1 UAVs", "the run has ended"]
     assert digest_of(output) == digest_of(ended(start("run", couple, "--digest")))

@@ -112,7 +112,9 @@ class DividedPair:
         return self
 
     def __exit__(self, *_exception):
-        self.division.close("the test is over")
+        with contextlib.suppress(VoleryError):
+            self.member.link.send("end", "the test is over")
+        self.member.close()
         self.simulation.close()
         for thread in self._threads:
             thread.join(60.0)

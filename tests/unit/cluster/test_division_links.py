@@ -8,6 +8,8 @@ import pytest
 
 from volery.cluster.division import link as links
 from volery.cluster.division.link import Link, LinkError, admit, apply_to
+from volery.cluster.division.workers import DivisionOptions, Workers
+from volery.scenario.load import load_scenario
 
 VERSIONS = {"volery": "0.1.0", "numba": "0.68.1"}
 
@@ -109,6 +111,34 @@ def test_a_silent_machine_is_lost_and_one_that_shows_life_is_not(monkeypatch):
         leader.receive()
     leader.close()
     worker.close()
+
+
+def joined(workers):
+    """Returns a worker's link to `workers`."""
+    link = Link(socket.create_connection(workers._listener.getsockname()), "the leader")
+    apply_to(link, "the token", workers._versions)
+    return link
+
+
+def test_a_worker_that_joins_late_is_a_spare_and_learns_of_the_end():
+    lines = []
+    options = DivisionOptions(1, listen=("127.0.0.1", 0), token="the token")
+    with Workers(options, load_scenario("forest_survey"), lines.append) as workers:
+        mute = socket.create_connection(workers._listener.getsockname())  # keeps nothing waiting
+        first = joined(workers)
+        workers._await_others()
+        spare = joined(workers)
+        found = workers._next_link(60.0)
+        assert found.name == "worker 2 (127.0.0.1)"
+        address = workers.address
+    for link in (first, spare):
+        assert link.receive() == ["end", "the run has ended"]
+        link.close()
+    mute.close()
+    assert lines == [
+        f"waiting for 1 workers: volery worker --join {address}",
+        "worker 1 (127.0.0.1) has joined",
+    ]
 
 
 def test_large_frames_come_after_the_greeting_only():

@@ -28,7 +28,7 @@ from volery.cluster.division.exchange import (
 )
 from volery.cluster.division.link import Frame, Link, LinkError
 from volery.cluster.division.node_services import NodeServices
-from volery.core.errors import DivisionError, GraphError, VoleryError
+from volery.core.errors import DivisionError, GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.runtime.division_parts import DivisionParts
 
@@ -207,16 +207,6 @@ class Leader:
     def end_round(self) -> None:
         """Notes that the effects of some commands have been delivered."""
         self._outbox.end_round()
-
-    def close(self, reason: str) -> None:
-        """Ends the workers' parts."""
-        for member in self._members:
-            try:
-                member.link.send("end", reason)
-            except VoleryError:
-                continue  # it has ended already
-            finally:
-                member.close()
 
     def _batch_of(self, member: Member) -> Frame:
         frame = member.link.receive()

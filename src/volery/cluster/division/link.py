@@ -21,6 +21,8 @@ from volery.core.network_access import tend
 
 Frame = list[Any]
 
+GREETING_S = 10.0
+"""Wall time for each frame before a machine is admitted, s."""
 SILENCE_S = 8.0
 """Wall time without a sign of life after which a machine is lost, s."""
 _SIGN_S = 1.0
@@ -41,7 +43,7 @@ class Link:
     def __init__(self, connection: socket.socket, name: str) -> None:
         self.name = name
         self._socket = connection
-        connection.settimeout(SILENCE_S)
+        connection.settimeout(GREETING_S)
         if connection.family != socket.AF_UNIX:
             tend(connection)
         self._max_bytes = _MAX_GREETING_BYTES
@@ -68,6 +70,7 @@ class Link:
     def show_life(self) -> None:
         """Sends signs of life from now on, and accepts large frames."""
         self._max_bytes = _MAX_BYTES
+        self._socket.settimeout(SILENCE_S)
         threading.Thread(target=self._show_life, name="signs of life", daemon=True).start()
 
     def close(self) -> None:
@@ -170,5 +173,5 @@ def _difference(own: dict[str, str], others: Any) -> str:
 
 def _reason(error: OSError) -> str:
     if isinstance(error, TimeoutError):
-        return f"no sign of life for {SILENCE_S:.0f} s"
+        return "no sign of life"
     return reason_of(error)

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import os
+import queue
 import secrets
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from volery.cluster.division.job import DivisionJob, files_of
 from volery.cluster.division.leader import Leader, Member, greeting_of
 from volery.cluster.division.link import Link, LinkError, admit
-from volery.cluster.division.partitioning import divided
+from volery.cluster.division.partitioning import check_divisible, divided
 from volery.cluster.runs import code_version
-from volery.core.errors import DivisionError, reason_of
+from volery.core.errors import DivisionError, VoleryError, reason_of
 from volery.core.machine import describe_versions, usable_cores
 from volery.engine.engine import Division
 from volery.runtime.build.partition import Partition
@@ -29,6 +32,10 @@ _GLANCE_S = 0.2
 _START_S = 120.0
 """Wall time within which a worker that was started here must join, s."""
 _FAREWELL_S = 5.0
+_MAX_UNPROVEN = 16
+"""Connections at a time that have not shown the token."""
+_PENALTY_S = 1.0
+"""Wall time for which a refused connection counts as one of them, s."""
 _LOG_LINES = 3
 _THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 TOKEN_VARIABLE = "VOLERY_TOKEN"
@@ -70,14 +77,18 @@ class Workers:
         host, port = options.listen or ("127.0.0.1", 0)
         self._listener = _listener(host, port)
         self._started: list[_LocalWorker] = []
+        self._links: list[Link] = []
         self._members: list[Member] = []
-        self._leader: Leader | None = None
+        self._joined: queue.SimpleQueue[Link] = queue.SimpleQueue()
+        """Workers that have joined and have no part yet."""
+        self._room = threading.Semaphore(_MAX_UNPROVEN)
+        threading.Thread(target=self._listen, name="division", daemon=True).start()
 
     def __enter__(self) -> Workers:
         return self
 
-    def __exit__(self, *_exception: object) -> None:
-        self.close("the run has ended")
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        self.close(str(error) if isinstance(error, VoleryError) else "the run has ended")
 
     @property
     def address(self) -> str:
@@ -90,9 +101,13 @@ class Workers:
 
         Raises `DivisionError` for a scenario that cannot be divided.
         """
-        shares = divided(self._scenario, self._options.workers + 1)
-        links = self._start() if self._options.listen is None else self._await_others()
-        self._members = [Member(*pair) for pair in zip(links, shares[1:], strict=True)]
+        check_divisible(self._scenario)
+        if self._options.listen is None:
+            self._start()
+        else:
+            self._await_others()
+        shares = divided(self._scenario, self._options.workers + 1)  # may build for minutes
+        self._members = [Member(*pair) for pair in zip(self._links, shares[1:], strict=True)]
         for member in self._members:
             self._hand_out(member.link, member.uavs)
         return Partition(named=frozenset().union(*shares[1:]))
@@ -101,14 +116,18 @@ class Workers:
         """Waits until all workers are ready; returns the connection of the leader to them."""
         for member in self._members:
             member.update(*greeting_of(member.link))
-        self._leader = Leader(parts, self._members, self._substitute)
-        return self._leader
+        return Leader(parts, self._members, self._substitute)
 
     def close(self, reason: str) -> None:
         """Ends the workers' parts, and the processes that were started here."""
+        self._listener.shutdown(socket.SHUT_RDWR)  # ends `accept`
         self._listener.close()
-        if self._leader is not None:
-            self._leader.close(reason)
+        while self._next_link() is not None:
+            continue
+        for link in self._links:
+            with suppress(DivisionError):  # it has ended already
+                link.send("end", reason)
+            link.close()
         for member in self._members:
             member.close()
         for worker in self._started:
@@ -116,53 +135,70 @@ class Workers:
 
     # ------------------------------------------------------------------------------------- inside
 
-    def _start(self) -> list[Link]:
+    def _start(self) -> None:
         threads = max(1, usable_cores() // (self._options.workers + 1))
-        return [self._started_here(threads) for _ in range(self._options.workers)]
+        for _ in range(self._options.workers):
+            self._start_here(threads)
 
-    def _await_others(self) -> list[Link]:
+    def _await_others(self) -> None:
         count = self._options.workers
         self._show(f"waiting for {count} workers: volery worker --join {self.address}")
-        links: list[Link] = []
-        while len(links) < count:
-            link = self._admitted(f"worker {len(links) + 1}")
+        while len(self._links) < count:
+            link = self._next_link(_GLANCE_S)
             if link is not None:
-                links.append(link)
                 self._show(f"{link.name} has joined")
             if self._is_stopped():
                 raise DivisionError("stopped while waiting for workers")
-        return links
 
-    def _started_here(self, threads: int) -> Link:
-        """Starts a worker on this machine and waits until it has joined."""
-        number = len(self._started) + 1
+    def _start_here(self, threads: int) -> Link:
+        """Starts a worker on this machine and waits until it, or another one, has joined."""
         worker = _LocalWorker(self.address, self._token, threads, trust=self._options.trust)
         self._started.append(worker)
         until = time.monotonic() + _START_S
         while time.monotonic() < until and not self._is_stopped():
-            link = self._admitted(f"worker {number}", pid=worker.pid)
+            link = self._next_link(_GLANCE_S)
             if link is not None:
                 return link
             if ending := worker.how_it_ended():
-                raise DivisionError(f"worker {number} {ending}")
-        raise DivisionError(f"worker {number} has not joined within {_START_S:.0f} s")
+                raise DivisionError(f"a worker {ending}")
+        raise DivisionError(f"a worker has not joined within {_START_S:.0f} s")
 
-    def _admitted(self, name: str, pid: int | None = None) -> Link | None:
-        """Returns the next worker that joins within a moment."""
+    def _next_link(self, timeout_s: float = 0.0) -> Link | None:
+        """Returns the connection to the worker that has joined first; None: there is none."""
         try:
-            connection, address = self._listener.accept()
-        except TimeoutError:
+            link = self._joined.get(timeout=timeout_s) if timeout_s else self._joined.get_nowait()
+        except queue.Empty:
             return None
-        shown = name if pid is not None else f"{name} ({address[0]})"
-        link = Link(connection, shown)
+        self._links.append(link)
+        link.name = f"worker {len(self._links)}{link.name}"
+        return link
+
+    def _listen(self) -> None:
+        """Admits workers until the listener is closed."""
+        while True:
+            try:
+                connection, address = self._listener.accept()
+            except OSError:
+                return
+            if self._room.acquire(blocking=False):
+                where = "" if self._options.listen is None else f" ({address[0]})"
+                threading.Thread(target=self._admit, args=(connection, where), daemon=True).start()
+            else:
+                connection.close()
+
+    def _admit(self, connection: socket.socket, where: str) -> None:
+        link = Link(connection, f"a worker{where}")
         try:
             admit(link, self._token, self._versions)
+            link.name = where
+            link.show_life()
+            self._joined.put(link)
         except LinkError as error:
-            self._show(str(error))
             link.close()
-            return None
-        link.show_life()
-        return link
+            self._show(str(error))
+            time.sleep(_PENALTY_S)  # so that tokens are not tried fast
+        finally:
+            self._room.release()
 
     def _hand_out(self, link: Link, uavs: frozenset[str], repeated: int = 0) -> None:
         """Sends a worker its part."""
@@ -182,9 +218,11 @@ class Workers:
         if self._options.drop:
             self._show(f"{reason}; {_listed(lost.uavs)} go on without their nodes and sensors")
             return None
-        self._show(f"{reason}; this machine repeats its part so far and takes it over")
+        link = self._next_link()
+        whose = "this machine" if link is None else link.name
+        self._show(f"{reason}; {whose} repeats its part so far and takes it over")
         start = time.monotonic()
-        link = self._started_here(threads=1)
+        link = link or self._start_here(threads=1)
         self._hand_out(link, lost.uavs, lost.num_answered)
         greeting_of(link)
         for frame in lost.history():
@@ -213,11 +251,6 @@ class _LocalWorker:
         except OSError as error:
             raise DivisionError(f"a worker cannot start: {reason_of(error)}") from None
 
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
     def how_it_ended(self) -> str:
         """Returns how the process ended, as text; empty: it runs."""
         code = self._process.poll()
@@ -243,7 +276,6 @@ def _listener(host: str, port: int) -> socket.socket:
         listener = socket.create_server((host, port), family=family)
     except (OSError, OverflowError) as error:
         raise DivisionError(f"--listen {host}:{port}: {reason_of(error)}") from None
-    listener.settimeout(_GLANCE_S)
     return listener
 
 
