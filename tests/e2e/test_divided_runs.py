@@ -28,6 +28,8 @@ name = "horizontal"
 [[types.a.sensors]]
 kind = "odometry"
 [[types.a.nodes]]
+node = "speaker:Speaker"
+[[types.a.nodes]]
 node = "gap_following"
 parameters = { route = [[60.0, 0.0]], height_m = 2.0, speed_m_s = 2.0 }
 [[uavs]]
@@ -36,6 +38,17 @@ count = 2
 position_m = [0.0, -6.0]
 last_position_m = [0.0, 6.0]
 """
+SPEAKER = """
+from rclpy.node import Node
+
+class Speaker(Node):
+    def __init__(self):
+        super().__init__("speaker")
+        self.create_timer(0.5, self.speak)
+
+    def speak(self):
+        self.get_logger().info(f"{self.get_namespace()} speaks")
+"""
 END_S = 120.0
 
 
@@ -43,6 +56,7 @@ END_S = 120.0
 def couple(tmp_path):
     path = tmp_path / "couple.toml"
     path.write_text(SCENARIO)
+    (tmp_path / "speaker.py").write_text(SPEAKER)
     return path
 
 
@@ -51,13 +65,14 @@ def start():
     """Starts a command of Volery, which ends with the test."""
     started = []
 
-    def begin(*words, token=None):
+    def begin(*words, token=None, **options):
         process = subprocess.Popen(
             [sys.executable, "-P", "-m", "volery", *map(str, words)],
             env={**os.environ, **({"VOLERY_TOKEN": token} if token else {})},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            **options,
         )
         started.append(process)
         return process
@@ -94,7 +109,7 @@ def children(pid):
 
 def test_a_killed_worker_is_replaced_and_the_flight_stays_the_same(start, couple, tmp_path):
     log = tmp_path / "flight.mcap"
-    words = ("run", couple, "--workers", 1, "--digest", "--record", log, "--speed", 3)
+    words = ("run", couple, "--trust", "--workers", 1, "--digest", "--record", log, "--speed", 3)
     leader = start(*words)
     until(lambda: log.exists() and log.stat().st_size > 100_000, leader)  # it flies
     (worker,) = children(leader.pid)
@@ -102,7 +117,9 @@ def test_a_killed_worker_is_replaced_and_the_flight_stays_the_same(start, couple
     output = ended(leader)
     assert "worker 1 is lost: " in output
     assert "this machine repeats its part so far and takes it over" in output
-    assert digest_of(output) == digest_of(ended(start("run", couple, "--digest")))
+    assert digest_of(output) == digest_of(ended(start("run", couple, "--trust", "--digest")))
+    for uav in ("uav1", "uav2"):  # the nodes of both machines speak on the leader's terminal
+        assert output.count(f"/{uav} speaks") >= 15
     topics = volery.open_log(log).topics
     scans = [len(volery.open_log(log)[f"/uav{k}/laser/horizontal/scan"]) for k in (1, 2)]
     assert "/uav2/cmd_vel" in topics
@@ -110,7 +127,8 @@ def test_a_killed_worker_is_replaced_and_the_flight_stays_the_same(start, couple
 
 
 def test_workers_join_from_elsewhere(start, couple):
-    leader = start("run", couple, "--workers", 1, "--listen", "127.0.0.1:0", "--digest", token="a")
+    listen = ("--workers", 1, "--listen", "127.0.0.1:0")
+    leader = start("run", couple, "--trust", *listen, "--digest", "--speed", 3, token="a")
     address = re.search(r"volery worker --join (\S+)", leader.stdout.readline())[1]
     stranger = start("worker", "--join", address, token="b")
     assert "the token is wrong" in stranger.communicate(timeout=END_S)[0]
@@ -118,6 +136,15 @@ def test_workers_join_from_elsewhere(start, couple):
     assert "was refused: the token is wrong" in leader.stdout.readline()
     worker = start("worker", "--join", address, token="a")
     assert "worker 1 (127.0.0.1) has joined" in leader.stdout.readline()
+    output = [leader.stdout.readline()]
+    assert "node 'speaker:Speaker' cannot be imported" in output[0]
+    assert "waiting for another worker" in output[0]
+    assert worker.wait(END_S) == 2
+    worker = start("worker", "--join", address, "--trust", token="a", cwd=couple.parent)
+    while "/uav2 speaks" not in (line := worker.stdout.readline()):
+        assert line, "the worker ended"
+    worker.kill()  # the substitute reads the scenario's folder
     output = ended(leader)
-    assert ended(worker).splitlines() == ["joined: serves 1 UAVs", "the run has ended"]
-    assert digest_of(output) == digest_of(ended(start("run", couple, "--digest")))
+    assert "this machine repeats its part so far and takes it over" in output
+    alone = start("run", couple, "--trust", "--digest")
+    assert digest_of(output) == digest_of(ended(alone))

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from volery.cli.error_reporting import warn
+import typer
+
+from volery.cli.error_reporting import USER_ERROR, warn
 from volery.cli.terminal import echo_line
-from volery.core.errors import DivisionError
+from volery.core.errors import DivisionError, VoleryError
 from volery.core.machine import usable_cores
 from volery.core.network_access import check_address, check_token
 
@@ -75,22 +77,33 @@ def parse_address(flag: str, text: str) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
-def join_run(address: str, token: str | None, threads: int | None, *, trust: bool) -> None:
-    """Joins the leader of a divided run and serves its part to the end."""
+def join_run(
+    address: str, token: str | None, threads: int | None, *, trust: bool, quiet: bool
+) -> None:
+    """Joins the leader of a divided run and serves its part to the end.
+
+    quiet: prints nothing; errors of the part reach the leader.
+    """
     host, port = parse_address("--join", address)
     if not token:
         raise DivisionError("set VOLERY_TOKEN to the token of the leader's run")
     from volery.cluster.division.joining import serve_leader
 
-    reason = serve_leader(
-        (host, port),
-        token,
-        threads=threads or usable_cores(),
-        trust=trust,
-        wait_s=_WAIT_S,
-        show=_show,
-    )
-    echo_line(reason)
+    try:
+        reason = serve_leader(
+            (host, port),
+            token,
+            threads=threads or usable_cores(),
+            trust=trust,
+            wait_s=_WAIT_S,
+            show=_ignore if quiet else _show,
+        )
+    except VoleryError:
+        if quiet:
+            raise typer.Exit(USER_ERROR) from None
+        raise
+    if not quiet:
+        echo_line(reason)
 
 
 def _check(options: RunOptions) -> None:
@@ -105,6 +118,10 @@ def _check(options: RunOptions) -> None:
     cores = usable_cores()
     if options.listen is None and (options.workers or 0) >= cores:
         warn(f"--workers {options.workers}: this machine has {cores} cores, one is the leader's")
+
+
+def _ignore(_line: str) -> None:
+    """Prints nothing."""
 
 
 def _show(line: str) -> None:

@@ -140,12 +140,15 @@ def worker(
     trust: Annotated[
         bool, typer.Option("--trust", help="Run node code of this machine that the leader names.")
     ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="Print only what nodes print; the leader gets errors.")
+    ] = False,
     traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
 ) -> None:
     """Serve a part of a run that is divided among machines, to its end."""
     from volery.cli.division import join_run
 
-    join_run(join, token, threads, trust=trust)
+    join_run(join, token, threads, trust=trust, quiet=quiet)
 
 
 @guarded

@@ -71,16 +71,16 @@ class SnapshotManager:
 
     def snapshot(self) -> Snapshot:
         """Returns the present state. Raises `SnapshotError` if it cannot be saved."""
-        check_nodes(self._manager.nodes, "a snapshot")
         self._check_whole("a snapshot")
+        check_nodes(self._manager.nodes, "a snapshot")
         self._check("a snapshot")
         self._engine.state_check.look()
         return Snapshot(self._engine.time_ns, id(self), self._manager.starts, self._state())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Restores `snapshot`. Raises `SnapshotError` if it is not of this simulation and fleet."""
-        check_nodes(self._manager.nodes, "to restore a state")
         self._check_whole("to restore a state")
+        check_nodes(self._manager.nodes, "to restore a state")
         self._check("to restore a state")
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"not a snapshot: {snapshot!r}; pass what snapshot() returned")

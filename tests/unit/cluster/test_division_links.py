@@ -7,8 +7,10 @@ import threading
 import pytest
 
 from volery.cluster.division import link as links
+from volery.cluster.division.leader import Member
 from volery.cluster.division.link import Link, LinkError, admit, apply_to
 from volery.cluster.division.workers import DivisionOptions, Workers
+from volery.core.errors import DivisionError
 from volery.scenario.load import load_scenario
 
 VERSIONS = {"volery": "0.1.0", "numba": "0.68.1"}
@@ -136,9 +138,50 @@ def test_a_worker_that_joins_late_is_a_spare_and_learns_of_the_end():
         link.close()
     mute.close()
     assert lines == [
-        f"waiting for 1 workers: volery worker --join {address}",
+        f"waiting for 1 worker: volery worker --join {address}",
         "worker 1 (127.0.0.1) has joined",
     ]
+
+
+class Substitute:
+    """A link to a worker that is lost after `frames` frames."""
+
+    def __init__(self, frames):
+        self.name, self.left = "", frames
+
+    def send(self, *_frame):
+        self.left -= 1
+        if self.left < 0:
+            raise LinkError("worker 7 is lost: it ended the connection")
+
+    send_bytes = send
+
+    def receive(self):
+        return ["ready", 0, {}]
+
+    def close(self):
+        """Has nothing to close."""
+
+
+@pytest.mark.parametrize(("lost", "is_taken_over"), [(0, True), (2, True), (3, False)])
+def test_substitutes_may_be_lost_too(monkeypatch, lost, is_taken_over):
+    lines = []
+    substitutes = [Substitute(1)] * lost + [Substitute(99)]
+    with Workers(DivisionOptions(1), load_scenario("forest_survey"), lines.append) as workers:
+        monkeypatch.setattr(workers, "_start_here", lambda threads: substitutes.pop(0))
+        member = Member(Substitute(99), frozenset({"uav3"}))
+        for frame in (["t", [], True, 5, None], ["e", []]):
+            member.send(*frame)
+        if is_taken_over:
+            assert workers._substitute(member, "worker 1 is lost: no sign of life").left == 96
+            assert len(lines) == lost + 2
+        else:
+            with pytest.raises(DivisionError, match="its part was lost 3 times"):
+                workers._substitute(member, "worker 1 is lost: no sign of life")
+        member.close()
+    assert lines[0] == (
+        "worker 1 is lost: no sign of life; this machine repeats its part so far and takes it over"
+    )
 
 
 def test_large_frames_come_after_the_greeting_only():

@@ -6,6 +6,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 from volery.cluster.division.job import DivisionJob
@@ -14,6 +15,7 @@ from volery.cluster.division.worker import RunEndedError, Worker
 from volery.cluster.runs import code_version
 from volery.core.errors import DivisionError, VoleryError, reason_of
 from volery.core.machine import describe_versions
+from volery.core.plurals import counted
 from volery.runtime.simulation import Simulation
 
 _RETRY_S = 0.5
@@ -34,20 +36,24 @@ def serve_leader(
     wall time within which the leader must listen. Raises `DivisionError` if it refuses this worker
     or is lost, any `VoleryError` that ends this part of the run.
     """
-    link = Link(_connected(address, wait_s), "the leader")
+    link = Link(_connected(address, wait_s, show), "the leader")
     try:
         apply_to(link, token, {"volery's code": code_version(), **describe_versions()})
         link.show_life()
+        show(f"has joined {address[0]}:{address[1]}")
         kind, *rest = link.receive()
         if kind == "end":
             return str(rest[0])
         if kind != "job":
             raise DivisionError("the leader sends no part of a run")
         job = DivisionJob(**rest[0])
-        show(f"joined: serves {len(job.uavs)} UAVs")
-        with tempfile.TemporaryDirectory(prefix="volery_") as place:
+        show(f"serves {counted(len(job.uavs), 'UAV')}")
+        with ExitStack() as made:
+            place = Path()
+            if job.files:
+                place = Path(made.enter_context(tempfile.TemporaryDirectory(prefix="volery_")))
             try:
-                return _flown(job, Path(place), link, threads=threads, trust=trust)
+                return _flown(job, place, link, threads=threads, trust=trust)
             except RunEndedError as error:
                 return str(error)
             except Exception as error:
@@ -71,8 +77,10 @@ def _flown(job: DivisionJob, place: Path, link: Link, *, threads: int, trust: bo
     return "the run has ended"
 
 
-def _connected(address: tuple[str, int], wait_s: float) -> socket.socket:
-    until = time.monotonic() + wait_s
+def _connected(
+    address: tuple[str, int], wait_s: float, show: Callable[[str], None]
+) -> socket.socket:
+    until, shown = time.monotonic() + wait_s, False
     while True:
         try:
             return socket.create_connection(address, 5.0)
@@ -82,6 +90,9 @@ def _connected(address: tuple[str, int], wait_s: float) -> socket.socket:
                     f"--join {address[0]}:{address[1]}: no leader there ({reason_of(error)}); "
                     "start it: volery run SCENARIO --workers N --listen HOST:PORT"
                 ) from None
+            if not shown:
+                show(f"waits up to {wait_s:.0f} s for a leader at {address[0]}:{address[1]}")
+            shown = True
             time.sleep(_RETRY_S)
 
 
@@ -89,6 +100,6 @@ def _report(link: Link, error: Exception) -> None:
     """Tells the leader why this part of the run has failed."""
     text = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
     try:
-        link.send("failed", text)
+        link.send("failed", text, list(getattr(error, "__notes__", ())))
     except DivisionError:
         return  # the leader is lost

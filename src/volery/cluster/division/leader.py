@@ -211,7 +211,7 @@ class Leader:
     def _batch_of(self, member: Member) -> Frame:
         frame = member.link.receive()
         if frame[0] == "failed":
-            raise _FailedError(f"{member.link.name}: {frame[1]}")
+            raise PartError(member.link.name, *frame[1:])
         if frame[0] != "b" or len(frame) != 6:
             raise LinkError(f"{member.link.name} sends a broken frame")
         return frame
@@ -281,15 +281,20 @@ def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
     """
     kind, *rest = link.receive()
     if kind == "failed":
-        raise _FailedError(f"{link.name}: {rest[0]}")
+        raise PartError(link.name, *rest)
     if kind != "ready" or len(rest) != 2:
         raise LinkError(f"{link.name} sends a broken frame")
     due, news = rest
     return int(due), news
 
 
-class _FailedError(DivisionError):
-    """A worker's part of the run has failed, as it would have here."""
+class PartError(DivisionError):
+    """A worker's part of the run has failed, as it would have here; the notes are its frames."""
+
+    def __init__(self, worker: str, text: str, notes: Sequence[str] = ()) -> None:
+        super().__init__(f"{worker}: {text}")
+        for note in notes:
+            self.add_note(note)
 
 
 def _send(frame: Frame, member: Member) -> None:

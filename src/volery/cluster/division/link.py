@@ -37,6 +37,10 @@ class LinkError(DivisionError):
     """Another machine of a divided run is lost, or does not fit."""
 
 
+class RefusedError(LinkError):
+    """A worker does not know the token, or has other versions."""
+
+
 class Link:
     """A connection to another machine; one thread receives, any thread sends."""
 
@@ -118,7 +122,7 @@ class Link:
 def admit(link: Link, token: str, versions: dict[str, str]) -> None:
     """Admits a worker that knows the token and has the leader's versions.
 
-    Raises `LinkError` for another one, after it has been told why.
+    Raises `RefusedError` for another one, after it has been told why, `LinkError` for what is none.
     """
     nonce = secrets.token_bytes(32)
     link.send("leader", nonce)
@@ -149,7 +153,7 @@ def apply_to(link: Link, token: str, versions: dict[str, str]) -> None:
 
 def _refuse(link: Link, reason: str) -> None:
     link.send("refused", reason)
-    raise LinkError(f"{link.name} was refused: {reason}")
+    raise RefusedError(f"{link.name} was refused: {reason}")
 
 
 def _proof(token: str, role: bytes, first: bytes, second: bytes) -> bytes:

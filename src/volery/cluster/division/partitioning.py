@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from volery.core.errors import DivisionError
+from volery.core.plurals import counted
 from volery.graph.nodes.handles import NodeEndpoints
 from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
@@ -47,14 +48,16 @@ def divided(scenario: Scenario, machines: int) -> list[frozenset[str]]:
         left -= len(group)
     if not all(shares[1:]):
         raise DivisionError(
-            f"{scenario.name} has {_counted(len(groups), central)} that can be divided, too few "
-            f"for {machines - 1} workers besides the leader"
+            f"{scenario.name} has {_counted(len(groups), central)} to be divided, too few for "
+            f"{counted(machines - 1, 'worker')} besides the leader"
         )
     return [frozenset(share) for share in shares]
 
 
 def _counted(groups: int, central: Sequence[str]) -> str:
-    return f"{groups} groups of UAVs" if central else f"{groups} UAVs or groups of them"
+    if central:
+        return f"{counted(groups, 'group')} of UAVs"
+    return f"{counted(groups, 'UAV')} (or groups of them)"
 
 
 def _groups(

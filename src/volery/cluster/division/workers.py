@@ -8,21 +8,22 @@ import secrets
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from volery.cluster.division.job import DivisionJob, files_of
 from volery.cluster.division.leader import Leader, Member, greeting_of
-from volery.cluster.division.link import Link, LinkError, admit
+from volery.cluster.division.link import Link, LinkError, RefusedError, admit
 from volery.cluster.division.partitioning import check_divisible, divided
 from volery.cluster.runs import code_version
 from volery.core.errors import DivisionError, VoleryError, reason_of
 from volery.core.machine import describe_versions, usable_cores
+from volery.core.plurals import counted
 from volery.engine.engine import Division
 from volery.runtime.build.partition import Partition
 from volery.runtime.division_parts import DivisionParts
@@ -32,11 +33,12 @@ _GLANCE_S = 0.2
 _START_S = 120.0
 """Wall time within which a worker that was started here must join, s."""
 _FAREWELL_S = 5.0
+_MAX_TRIES = 3
+"""Substitutes for a lost worker that may be lost before they have taken over."""
 _MAX_UNPROVEN = 16
 """Connections at a time that have not shown the token."""
 _PENALTY_S = 1.0
 """Wall time for which a refused connection counts as one of them, s."""
-_LOG_LINES = 3
 _THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 TOKEN_VARIABLE = "VOLERY_TOKEN"
 
@@ -79,6 +81,7 @@ class Workers:
         self._started: list[_LocalWorker] = []
         self._links: list[Link] = []
         self._members: list[Member] = []
+        self._has_begun = False
         self._joined: queue.SimpleQueue[Link] = queue.SimpleQueue()
         """Workers that have joined and have no part yet."""
         self._room = threading.Semaphore(_MAX_UNPROVEN)
@@ -115,7 +118,8 @@ class Workers:
     def connect(self, parts: DivisionParts) -> Division:
         """Waits until all workers are ready; returns the connection of the leader to them."""
         for member in self._members:
-            member.update(*greeting_of(member.link))
+            member.update(*self._greeting_of(member))
+        self._has_begun = True
         return Leader(parts, self._members, self._substitute)
 
     def close(self, reason: str) -> None:
@@ -142,7 +146,7 @@ class Workers:
 
     def _await_others(self) -> None:
         count = self._options.workers
-        self._show(f"waiting for {count} workers: volery worker --join {self.address}")
+        self._show(f"waiting for {counted(count, 'worker')}: volery worker --join {self.address}")
         while len(self._links) < count:
             link = self._next_link(_GLANCE_S)
             if link is not None:
@@ -162,6 +166,24 @@ class Workers:
             if ending := worker.how_it_ended():
                 raise DivisionError(f"a worker {ending}")
         raise DivisionError(f"a worker has not joined within {_START_S:.0f} s")
+
+    def _greeting_of(self, member: Member) -> tuple[int, dict[str, Any]]:
+        """Waits until a worker is ready; another one takes the part of one that cannot start."""
+        while True:
+            try:
+                return greeting_of(member.link)
+            except DivisionError as error:
+                if self._options.listen is None:
+                    raise
+                self._show(f"{error}; waiting for another worker")
+            link = None
+            while link is None:
+                if self._is_stopped():
+                    raise DivisionError("stopped while waiting for workers")
+                link = self._next_link(_GLANCE_S)
+            member.link.close()
+            member.link = link
+            self._hand_out(link, member.uavs)
 
     def _next_link(self, timeout_s: float = 0.0) -> Link | None:
         """Returns the connection to the worker that has joined first; None: there is none."""
@@ -193,16 +215,21 @@ class Workers:
             link.name = where
             link.show_life()
             self._joined.put(link)
+            if self._has_begun and where:
+                self._show(f"a worker{where} has joined as a spare")
         except LinkError as error:
             link.close()
-            self._show(str(error))
+            if isinstance(error, RefusedError):
+                self._show(str(error))
             time.sleep(_PENALTY_S)  # so that tokens are not tried fast
         finally:
             self._room.release()
 
-    def _hand_out(self, link: Link, uavs: frozenset[str], repeated: int = 0) -> None:
-        """Sends a worker its part."""
-        access, is_here = self._scenario.access, self._options.listen is None
+    def _hand_out(
+        self, link: Link, uavs: frozenset[str], repeated: int = 0, *, is_here: bool = False
+    ) -> None:
+        """Sends a worker its part; is_here: it reads the scenario's folder."""
+        access, is_here = self._scenario.access, is_here or self._options.listen is None
         folder = str((access.folder or Path()).resolve()) if is_here else ""
         job = DivisionJob(
             self._scenario.model_dump(exclude_unset=True, mode="json"),
@@ -216,36 +243,40 @@ class Workers:
     def _substitute(self, lost: Member, reason: str) -> Link | None:
         """Has the part of a lost worker repeated here; see `leader.Substitute`."""
         if self._options.drop:
-            self._show(f"{reason}; {_listed(lost.uavs)} go on without their nodes and sensors")
+            self._show(f"{reason}; without nodes and sensors from now on: {_listed(lost.uavs)}")
             return None
-        link = self._next_link()
-        whose = "this machine" if link is None else link.name
-        self._show(f"{reason}; {whose} repeats its part so far and takes it over")
         start = time.monotonic()
-        link = link or self._start_here(threads=1)
-        self._hand_out(link, lost.uavs, lost.num_answered)
-        greeting_of(link)
-        for frame in lost.history():
-            link.send_bytes(frame)
-        self._show(f"{_listed(lost.uavs)}: taken over after {time.monotonic() - start:.1f} s")
-        return link
+        for _ in range(_MAX_TRIES):
+            spare = self._next_link()
+            whose = "this machine" if spare is None else spare.name
+            self._show(f"{reason}; {whose} repeats its part so far and takes it over")
+            try:
+                link = spare or self._start_here(threads=1)
+                self._hand_out(link, lost.uavs, lost.num_answered, is_here=spare is None)
+                greeting_of(link)
+                for frame in lost.history():
+                    link.send_bytes(frame)
+            except LinkError as error:
+                reason = str(error)
+                continue
+            took_s = time.monotonic() - start
+            self._show(f"{_listed(lost.uavs)}: taken over after {took_s:.1f} s")
+            return link
+        raise DivisionError(f"{reason}; its part was lost {_MAX_TRIES} times")
 
 
 class _LocalWorker:
     """A worker process on this machine."""
 
     def __init__(self, address: str, token: str, threads: int, *, trust: bool) -> None:
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
         single = {f"{name}_NUM_THREADS": str(threads) for name in _THREADS}
         command = [sys.executable, "-P", "-m", "volery", "worker", "--join", address]
-        command += ["--threads", str(threads), *(["--trust"] if trust else [])]
+        command += ["--quiet", "--threads", str(threads), *(["--trust"] if trust else [])]
         try:
             self._process = subprocess.Popen(
                 command,
                 env={**os.environ, **single, TOKEN_VARIABLE: token},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=self._log,
+                stdin=subprocess.DEVNULL,  # what its nodes print goes to the leader's terminal
                 start_new_session=True,  # Ctrl-C is the leader's
             )
         except OSError as error:
@@ -254,11 +285,7 @@ class _LocalWorker:
     def how_it_ended(self) -> str:
         """Returns how the process ended, as text; empty: it runs."""
         code = self._process.poll()
-        if code is None:
-            return ""
-        self._log.seek(0)
-        lines = self._log.read().decode(errors="replace").splitlines()[-_LOG_LINES:]
-        return f"ended with exit code {code}: {' | '.join(lines)}"
+        return "" if code is None else f"ended with exit code {code}"
 
     def close(self) -> None:
         """Ends the process."""
@@ -267,7 +294,6 @@ class _LocalWorker:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._log.close()
 
 
 def _listener(host: str, port: int) -> socket.socket:
@@ -275,7 +301,9 @@ def _listener(host: str, port: int) -> socket.socket:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         listener = socket.create_server((host, port), family=family)
     except (OSError, OverflowError) as error:
-        raise DivisionError(f"--listen {host}:{port}: {reason_of(error)}") from None
+        raise DivisionError(
+            f"--listen {host}:{port}: {reason_of(error)}; give another port"
+        ) from None
     return listener
 
 
