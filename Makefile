@@ -94,6 +94,7 @@ docs: $(VENV)/.installed-docs ## build the documentation site: build/site/index.
 
 bench: $(VENV)/.installed-bench page ## measure this machine and its peers, rewrite docs/benchmarks.md and docs/bridge_latency.md
 	@mkdir -p runs
+	@.ci/install_open3d
 	$(BIN)/volery bench --all --out runs/bench.json
 	$(BIN)/volery bench peers --out runs/peers.json
 	@.ci/install_browser

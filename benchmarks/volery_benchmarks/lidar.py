@@ -16,7 +16,6 @@ open3d's call has no max range. One thread each, in turns, medians.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import statistics
 import time
 from collections.abc import Callable, Mapping
@@ -41,18 +40,23 @@ from volery_benchmarks.forest_beams import (
     rays_of,
     scans_of,
 )
+from volery_benchmarks.registry import Measured
 
 _FEWEST_ROUNDS, _MOST_ROUNDS = 5, 40
 _BUDGET_S = 40.0
 """Duration of repeated casting; `quick` takes the fewest rounds."""
 
 
-def measure(*, quick: bool = False) -> dict[str, float]:
-    """Returns the figures of the bench `lidar`."""
+def measure(*, quick: bool = False) -> Measured:
+    """Returns the figures of the bench `lidar`; without open3d, why it cannot be measured."""
     seconds_budget = 0.0 if quick else _BUDGET_S
-    figures = _whole_forest(0.55 * seconds_budget)
-    figures.update(_peers(0.45 * seconds_budget))
-    return figures
+    figures, failures = _whole_forest(0.55 * seconds_budget), {}
+    try:
+        importlib.import_module("open3d")
+    except (ImportError, OSError) as error:  # installed, but a library of the system is missing
+        failures["ratio_to_open3d"] = str(error)
+    figures.update(_peers(0.45 * seconds_budget, with_open3d=not failures))
+    return Measured(figures, failures)
 
 
 def _take_turns(
@@ -103,7 +107,7 @@ def _whole_forest(seconds_budget: float) -> dict[str, float]:
     return figures
 
 
-def _peers(seconds_budget: float) -> dict[str, float]:
+def _peers(seconds_budget: float, *, with_open3d: bool) -> dict[str, float]:
     """Returns Volery's speed over that of the peers on the same piece of forest."""
     terrain = Terrain.flat(extent_m=PIECE_M)
     forest = forest_of(PIECE_M, terrain)
@@ -114,7 +118,7 @@ def _peers(seconds_budget: float) -> dict[str, float]:
         "ours": lambda: scene.cast(origins, directions, REACH_M),
         "ratio_to_embreex_run": _embreex_call(whole, origins, directions),
     }
-    if importlib.util.find_spec("open3d") is not None:
+    if with_open3d:
         calls["ratio_to_open3d"] = _open3d_call(whole, origins, directions)
     seconds = _take_turns(calls, seconds_budget)
     scene.close()
