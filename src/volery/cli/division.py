@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -78,7 +79,13 @@ def parse_address(flag: str, text: str) -> tuple[str, int]:
 
 
 def join_run(
-    address: str, token: str | None, threads: int | None, *, trust: bool, quiet: bool
+    address: str,
+    token: str | None,
+    threads: int | None,
+    *,
+    trust: bool,
+    folder: Path | None,
+    quiet: bool,
 ) -> None:
     """Joins the leader of a divided run and serves its part to the end.
 
@@ -95,6 +102,7 @@ def join_run(
             token,
             threads=threads or usable_cores(),
             trust=trust,
+            folder=folder,
             wait_s=_WAIT_S,
             show=_ignore if quiet else _show,
         )

@@ -140,6 +140,10 @@ def worker(
     trust: Annotated[
         bool, typer.Option("--trust", help="Run node code of this machine that the leader names.")
     ] = False,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Read the scenario's files in this folder; default: they travel."),
+    ] = None,
     quiet: Annotated[
         bool, typer.Option("--quiet", help="Print only what nodes print; the leader gets errors.")
     ] = False,
@@ -148,7 +152,7 @@ def worker(
     """Serve a part of a run that is divided among machines, to its end."""
     from volery.cli.division import join_run
 
-    join_run(join, token, threads, trust=trust, quiet=quiet)
+    join_run(join, token, threads, trust=trust, folder=folder, quiet=quiet)
 
 
 @guarded

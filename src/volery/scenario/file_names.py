@@ -22,6 +22,18 @@ def moved(data: Mapping[str, Any], old: Path | None, new: Path) -> dict[str, Any
     return {key: _moved(key, value, folder, new.resolve()) for key, value in data.items()}
 
 
+def texts_of(data: Any) -> Iterator[str]:
+    """Yields all texts in plain data, file names among them."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, Mapping):
+        for value in data.values():
+            yield from texts_of(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from texts_of(value)
+
+
 def named_files(data: Mapping[str, Any], folder: Path | None) -> Iterator[Path]:
     """Yields the existing files that a scenario's plain data name, shipped ones excluded.
 

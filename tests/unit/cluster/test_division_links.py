@@ -1,5 +1,6 @@
 """Links between machines: who is admitted, what is refused, what counts as a loss."""
 
+import contextlib
 import socket
 import struct
 import threading
@@ -7,10 +8,11 @@ import threading
 import pytest
 
 from volery.cluster.division import link as links
+from volery.cluster.division.joining import serve_leader
 from volery.cluster.division.leader import Member
 from volery.cluster.division.link import Link, LinkError, admit, apply_to
 from volery.cluster.division.workers import DivisionOptions, Workers
-from volery.core.errors import DivisionError
+from volery.core.errors import DataFileError, DivisionError
 from volery.scenario.load import load_scenario
 
 VERSIONS = {"volery": "0.1.0", "numba": "0.68.1"}
@@ -141,6 +143,44 @@ def test_a_worker_that_joins_late_is_a_spare_and_learns_of_the_end():
         f"waiting for 1 worker: volery worker --join {address}",
         "worker 1 (127.0.0.1) has joined",
     ]
+
+
+def test_a_worker_without_files_reads_none_of_its_working_folder(tmp_path, monkeypatch):
+    (tmp_path / "secret.csv").write_text("0,1\n1,0\n")
+    monkeypatch.chdir(tmp_path)
+    terrain = {"kind": "grid", "file": "secret.csv", "spacing_m": 1.0}
+    content = {"name": "spy", "world": {"terrain": terrain}, "types": {"a": {}}}
+    content["uavs"] = [{"type": "a", "position_m": [0.0, 0.0]}]
+    found = []
+    with Workers(
+        DivisionOptions(1, listen=("127.0.0.1", 0), token="the token"),
+        load_scenario("forest_survey"),
+        found.append,
+    ) as workers:
+
+        def lead():
+            workers._await_others()
+            link = workers._links[0]
+            link.send("job", {"content": content, "files": {}, "uavs": ["uav1"], "repeated": 0})
+            found.append(link.receive())
+            with contextlib.suppress(LinkError):  # the worker has ended
+                link.send("end", "it was not refused")
+
+        thread = threading.Thread(target=lead)
+        thread.start()
+        with pytest.raises(DataFileError, match=r"no file 'secret\.csv' that may be read"):
+            serve_leader(
+                workers._listener.getsockname(),
+                "the token",
+                threads=1,
+                trust=False,
+                folder=None,
+                wait_s=60.0,
+                show=found.append,
+            )
+        thread.join(60.0)
+    assert found[-1][0] == "failed"
+    assert "secret.csv" in found[-1][1]
 
 
 class Substitute:

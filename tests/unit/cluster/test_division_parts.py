@@ -78,7 +78,7 @@ position_m = [0.0, 0.0]
 
 def job_of(scenario, **changes):
     content = scenario.model_dump(exclude_unset=True, mode="json")
-    parts = {"content": content, "folder": "", "files": files_of(scenario), "uavs": ("uav1",)}
+    parts = {"content": content, "files": files_of(scenario), "uavs": ("uav1",)}
     return DivisionJob(**{**parts, **changes})
 
 

@@ -34,6 +34,11 @@ MESSAGE, EXTERNAL, CALL, COMMAND, ROUND, ANSWER = "m", "e", "s", "k", "r", "w"
 end of a round of commands, whose messages are delivered then; a node's response to a client."""
 
 
+TICK, RESPONSES, EARLY, BATCH = "t", "a", "e", "b"
+"""Frames of the leader: what precedes a tick, or timers, and items that no batch answers; the batch
+of a worker, which answers the others."""
+
+
 class Outbox:
     """Collects what this machine does that the others cannot know."""
 

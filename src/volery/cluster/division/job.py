@@ -1,8 +1,8 @@
 """What a leader hands to a worker before a divided run, as plain data.
 
-A worker of the same machine reads the files of the scenario where they are. To another machine
-travel those that the scenario names; it reads no other files of its own, and starts nodes that ship
-with Volery or are installed there, unless it trusts its leader.
+The files that the scenario names travel. A worker reads no others of its own, and starts nodes that
+ship with Volery or are installed there, unless it trusts its leader. A worker that was started with
+the folder of the scenario reads the files there.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 from volery.core.errors import DivisionError
 from volery.runtime.build.partition import Partition
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.file_names import texts_of
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
@@ -28,19 +29,18 @@ class DivisionJob:
 
     content: dict[str, Any]
     """The scenario, as plain data."""
-    folder: str
-    """Its folder, for a worker of the same machine; empty: `files` travel."""
     files: dict[str, bytes]
-    """Contents of the scenario's files by their names."""
+    """Contents of the scenario's files by their names; none for a worker that has its folder."""
     uavs: tuple[str, ...]
     """UAVs that the worker serves."""
     repeated: int = 0
-    """Frames of the leader that a lost worker has answered."""
+    """Frames of the leader, but the early ones, that a lost worker was sent."""
 
-    def scenario(self, place: Path, *, trust: bool) -> Scenario:
-        """Returns the scenario; its files are written into the folder `place`.
+    def scenario(self, place: Path, *, trust: bool, folder: Path | None = None) -> Scenario:
+        """Returns the scenario; its files are written into the empty folder `place`.
 
-        Raises `ScenarioError`, `DivisionError`.
+        folder: that of the scenario, if this machine has it; then all files may be read. Raises
+        `ScenarioError`, `DivisionError`.
         """
         for name, content in self.files.items():
             if not _is_inner(name):
@@ -49,8 +49,8 @@ class DivisionJob:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
         access = ScenarioAccess(
-            Path(self.folder) if self.folder else place,
-            is_confined=not (trust or self.folder),
+            place if folder is None else folder,
+            is_confined=not trust and folder is None,
             is_trusted=trust,
             own_nodes=frozenset(_nodes(self.content)),
         )
@@ -71,7 +71,7 @@ def files_of(scenario: Scenario) -> dict[str, bytes]:
     folder = Path() if scenario.access.folder is None else scenario.access.folder
     found: dict[str, bytes] = {}
     size = 0
-    for name in _texts(scenario.model_dump(exclude_unset=True)):
+    for name in texts_of(scenario.model_dump(exclude_unset=True)):
         path = folder / name
         if name in found or not _is_file(path):
             continue
@@ -107,15 +107,3 @@ def _nodes(content: dict[str, Any]) -> Iterator[str]:
     for kind in content.get("types", {}).values():
         yield from (entry["node"] for entry in kind.get("nodes", ()))
     yield from (entry["node"] for entry in content.get("nodes", ()))
-
-
-def _texts(data: Any) -> Iterator[str]:
-    """Yields all strings in plain data."""
-    if isinstance(data, str):
-        yield data
-    elif isinstance(data, dict):
-        for value in data.values():
-            yield from _texts(value)
-    elif isinstance(data, list | tuple):
-        for value in data:
-            yield from _texts(value)

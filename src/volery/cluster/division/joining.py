@@ -6,7 +6,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 from volery.cluster.division.job import DivisionJob
@@ -16,7 +16,9 @@ from volery.cluster.runs import code_version
 from volery.core.errors import DivisionError, VoleryError, reason_of
 from volery.core.machine import describe_versions
 from volery.core.plurals import counted
+from volery.runtime.division_parts import DivisionParts
 from volery.runtime.simulation import Simulation
+from volery.scenario.schema import Scenario
 
 _RETRY_S = 0.5
 
@@ -27,14 +29,16 @@ def serve_leader(
     *,
     threads: int,
     trust: bool,
+    folder: Path | None,
     wait_s: float,
     show: Callable[[str], None],
 ) -> str:
     """Joins the leader at `address` and serves it; returns why the run ended.
 
-    trust: whether code that the leader names may run from this machine's working folder. wait_s:
-    wall time within which the leader must listen. Raises `DivisionError` if it refuses this worker
-    or is lost, any `VoleryError` that ends this part of the run.
+    trust: whether code that the leader names may run from this machine's working folder. folder:
+    that of the scenario, if this machine has it. wait_s: wall time within which the leader must
+    listen. Raises `DivisionError` if it refuses this worker or is lost, any `VoleryError` that ends
+    this part of the run.
     """
     link = Link(_connected(address, wait_s, show), "the leader")
     try:
@@ -48,12 +52,10 @@ def serve_leader(
             raise DivisionError("the leader sends no part of a run")
         job = DivisionJob(**rest[0])
         show(f"serves {counted(len(job.uavs), 'UAV')}")
-        with ExitStack() as made:
-            place = Path()
-            if job.files:
-                place = Path(made.enter_context(tempfile.TemporaryDirectory(prefix="volery_")))
+        with tempfile.TemporaryDirectory(prefix="volery_") as place:
+            scenario = partial(job.scenario, Path(place), trust=trust, folder=folder)
             try:
-                return _flown(job, place, link, threads=threads, trust=trust)
+                return _flown(job, scenario, link, threads)
             except RunEndedError as error:
                 return str(error)
             except Exception as error:
@@ -63,12 +65,11 @@ def serve_leader(
         link.close()
 
 
-def _flown(job: DivisionJob, place: Path, link: Link, *, threads: int, trust: bool) -> str:
-    scenario = job.scenario(place, trust=trust)
-    with Simulation(scenario, threads=threads, partition=job.partition) as simulation:
+def _flown(job: DivisionJob, scenario: Callable[[], Scenario], link: Link, threads: int) -> str:
+    with Simulation(scenario(), threads=threads, partition=job.partition) as simulation:
 
-        def connect(parts: object) -> Worker:
-            worker = Worker(parts, link, job.repeated)  # type: ignore[arg-type]
+        def connect(parts: DivisionParts) -> Worker:
+            worker = Worker(parts, link, job.repeated)
             worker.greet()
             return worker
 

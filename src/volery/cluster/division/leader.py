@@ -1,8 +1,8 @@
 """The leader's end of a divided run.
 
-At a barrier it waits for what the workers have published, and passes it on; then it
-sends them what its own nodes have published and its clients have commanded, with the step of the
-next barrier. Where a worker's nodes may respond to that, the machines exchange again first.
+At a barrier it waits for what the workers have published, and passes it on; then it sends them what
+its own nodes have published and its clients have commanded, with the step of the next barrier.
+Where a worker's nodes may respond to that, the machines exchange again first.
 """
 
 from __future__ import annotations
@@ -17,10 +17,14 @@ import cbor2
 
 from volery.cluster.division.barriers import Barriers
 from volery.cluster.division.exchange import (
+    BATCH,
     CALL,
     COMMAND,
+    EARLY,
     EXTERNAL,
     MESSAGE,
+    RESPONSES,
+    TICK,
     Inbox,
     Item,
     Outbox,
@@ -32,8 +36,6 @@ from volery.core.errors import DivisionError, GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.runtime.division_parts import DivisionParts
 
-EARLY = "e"
-"""Kind of the frames that no batch answers."""
 _SIZE_BYTES = 4
 
 
@@ -138,7 +140,7 @@ class Leader:
             due = min([last_step, barriers.due_step(), *(member.due for member in self._members)])
             next_step = max(due, self._engine.fleet.step)
             for member, items in pending.items():
-                frame = ["t", items, final, next_step, news[member]]
+                frame = [TICK, items, final, next_step, news[member]]
                 self._reach(member, partial(_send, frame))
             if final:
                 barriers.close(next_step)
@@ -160,7 +162,7 @@ class Leader:
         if self._has_timers:
             own = self._outbox.flush()
             for member in tuple(self._members):
-                frame = ["a", self._items_for(member, own)]
+                frame = [RESPONSES, self._items_for(member, own)]
                 self._reach(member, partial(_send, frame))
 
     def end_tick(self) -> None:
@@ -212,7 +214,7 @@ class Leader:
         frame = member.link.receive()
         if frame[0] == "failed":
             raise PartError(member.link.name, *frame[1:])
-        if frame[0] != "b" or len(frame) != 6:
+        if frame[0] != BATCH or len(frame) != 6:
             raise LinkError(f"{member.link.name} sends a broken frame")
         return frame
 
@@ -275,7 +277,7 @@ class Leader:
 
 
 def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
-    """Waits until a worker is ready; returns what it tells of itself: see `Member.heard`.
+    """Waits until a worker is ready; returns what it tells of itself: see `Member.update`.
 
     Raises `DivisionError` if its part cannot start.
     """

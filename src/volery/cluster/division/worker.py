@@ -5,7 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from volery.cluster.division.barriers import Barriers
-from volery.cluster.division.exchange import Inbox, Outbox, state_hash
+from volery.cluster.division.exchange import (
+    BATCH,
+    EARLY,
+    RESPONSES,
+    TICK,
+    Inbox,
+    Outbox,
+    state_hash,
+)
 from volery.cluster.division.link import Frame, Link, LinkError
 from volery.core.errors import VoleryError
 from volery.runtime.division_parts import DivisionParts
@@ -18,7 +26,7 @@ class RunEndedError(VoleryError):
 class Worker:
     """Implements an engine's `Division` on a worker.
 
-    repeated: number of the leader's frames that a lost worker has received, but the early ones.
+    repeated: number of the leader's frames, but the early ones, that a lost worker was sent.
     """
 
     def __init__(self, parts: DivisionParts, link: Link, repeated: int = 0) -> None:
@@ -56,7 +64,7 @@ class Worker:
             self._waiting = None
             if kind == "end":
                 raise RunEndedError(str(rest[0]))
-            if kind != "t" or len(rest) != 4:
+            if kind != TICK or len(rest) != 4:
                 raise LinkError(f"{self._link.name} sends a broken frame")
             items, final, next_step, wishes = rest
             self._left_to_repeat = max(0, self._left_to_repeat - 1)
@@ -78,10 +86,10 @@ class Worker:
         self._has_responses = True
         self._send()
         frame = self._link.receive()
-        while frame[0] == "e":
+        while frame[0] == EARLY:
             self._inbox.apply(frame[1])
             frame = self._link.receive()
-        if frame[0] != "a":  # no timers anywhere: the next tick begins
+        if frame[0] != RESPONSES:  # no timers anywhere: the next tick begins
             self._waiting = frame
             return
         self._has_timers = True
@@ -106,7 +114,7 @@ class Worker:
         self._exchanges += 1
         if not self._left_to_repeat:
             due, timers = self._barriers.due_step(), self._barriers.has_timers()
-            self._link.send("b", items, due, timers, own_hash, self._news())
+            self._link.send(BATCH, items, due, timers, own_hash, self._news())
 
     def _news(self) -> dict[str, Any]:
         """Returns the topics published and needed here, if they have changed."""

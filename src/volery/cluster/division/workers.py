@@ -156,7 +156,9 @@ class Workers:
 
     def _start_here(self, threads: int) -> Link:
         """Starts a worker on this machine and waits until it, or another one, has joined."""
-        worker = _LocalWorker(self.address, self._token, threads, trust=self._options.trust)
+        folder = self._scenario.access.folder or Path()
+        trusts = self._options.trust
+        worker = _LocalWorker(self.address, self._token, threads, folder, trust=trusts)
         self._started.append(worker)
         until = time.monotonic() + _START_S
         while time.monotonic() < until and not self._is_stopped():
@@ -228,13 +230,11 @@ class Workers:
     def _hand_out(
         self, link: Link, uavs: frozenset[str], repeated: int = 0, *, is_here: bool = False
     ) -> None:
-        """Sends a worker its part; is_here: it reads the scenario's folder."""
-        access, is_here = self._scenario.access, is_here or self._options.listen is None
-        folder = str((access.folder or Path()).resolve()) if is_here else ""
+        """Sends a worker its part; is_here: it was started here, with the scenario's folder."""
+        has_folder = is_here or self._options.listen is None
         job = DivisionJob(
             self._scenario.model_dump(exclude_unset=True, mode="json"),
-            folder,
-            {} if is_here else files_of(self._scenario),
+            {} if has_folder else files_of(self._scenario),
             tuple(sorted(uavs)),
             repeated,
         )
@@ -268,10 +268,19 @@ class Workers:
 class _LocalWorker:
     """A worker process on this machine."""
 
-    def __init__(self, address: str, token: str, threads: int, *, trust: bool) -> None:
+    def __init__(
+        self, address: str, token: str, threads: int, folder: Path, *, trust: bool
+    ) -> None:
         single = {f"{name}_NUM_THREADS": str(threads) for name in _THREADS}
         command = [sys.executable, "-P", "-m", "volery", "worker", "--join", address]
-        command += ["--quiet", "--threads", str(threads), *(["--trust"] if trust else [])]
+        command += [
+            "--folder",
+            str(folder.resolve()),
+            "--quiet",
+            "--threads",
+            str(threads),
+            *(["--trust"] if trust else []),
+        ]
         try:
             self._process = subprocess.Popen(
                 command,

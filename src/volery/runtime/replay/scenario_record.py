@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core.errors import ScenarioError
 from volery.graph.graph import Graph
 from volery.graph.messages import String
 from volery.scenario.access import ScenarioAccess
+from volery.scenario.file_names import texts_of
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
@@ -65,18 +64,6 @@ def _lent(own: Scenario) -> ScenarioAccess:
     return replace(
         access,
         is_confined=True,
-        own_names=frozenset(_texts(own.model_dump(exclude_unset=True))),
+        own_names=frozenset(texts_of(own.model_dump(exclude_unset=True))),
         own_nodes=frozenset(entry.node for entry in own.node_entries),
     )
-
-
-def _texts(data: Any) -> Iterator[str]:
-    """Yields all strings in plain data, file names among them."""
-    if isinstance(data, str):
-        yield data
-    elif isinstance(data, dict):
-        for value in data.values():
-            yield from _texts(value)
-    elif isinstance(data, list | tuple):
-        for value in data:
-            yield from _texts(value)
