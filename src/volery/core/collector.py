@@ -21,6 +21,7 @@ class _Contexts:
     """Number of contexts that have not ended, and the thresholds before the first of them."""
 
     num_open = 0
+    num_begun = 0
     thresholds = gc.get_threshold()
 
 
@@ -31,11 +32,13 @@ def spared_objects() -> Iterator[None]:
     Enter the context when a simulation has been built: its objects live as long as the simulation.
     Contexts of several threads may overlap: the last one to end restores the collector.
     """
-    gc.collect()
+    if _Contexts.num_begun:  # a process that has just started has next to no garbage
+        gc.collect()
     with _lock:
         if not _Contexts.num_open:
             _Contexts.thresholds = gc.get_threshold()
         _Contexts.num_open += 1
+        _Contexts.num_begun += 1
         gc.freeze()
         gc.set_threshold(*_THRESHOLDS)
     try:

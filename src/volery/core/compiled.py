@@ -26,14 +26,18 @@ from typing import Any, TypeVar
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
+from numba.core import sigutils
+from numba.core.ccallback import CFunc
 
-from volery.core.kernel_places import LOCATORS
+from volery.core.kernel_cache import LOCATORS, KernelCache
 from volery.core.private_folders import UnsafeFolderError, private_folder, temporary_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
 _TYPES: Any = numba.types
+_SIGNATURES: Any = sigutils
+_CALLBACK: Any = CFunc
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KEEP_CACHES = 3
@@ -190,14 +194,25 @@ def _decorate(function: F, **options: Any) -> F:
     said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
     # Kernels are never passed to C code: entries for C would take a tenth of the time to compile.
     choices = {**said, "nogil": True, "no_cfunc_wrapper": True, **options}
-    with cached_here():
-        compiled: F = numba.njit(cache=True, **choices)(function)
-    return compiled
+    with _cached_here():
+        compiled: Any = numba.njit(**choices)(function)
+        compiled._cache = KernelCache(function)
+    return compiled  # type: ignore[no-any-return]
+
+
+def compiled_callback(function: Callable[..., Any], signature: Any) -> Any:
+    """Compiles a C function, cached like kernels; its `address` is for C code."""
+    arguments, result = _SIGNATURES.normalize_signature(signature)
+    with _cached_here():
+        callback: Any = _CALLBACK(function, (arguments, result), locals={}, options={})
+        callback._cache = KernelCache(function)
+        callback.compile()
+    return callback
 
 
 @contextmanager
-def cached_here() -> Iterator[None]:
-    """Makes numba use `cache_dir` for functions that it decorates in this context."""
+def _cached_here() -> Iterator[None]:
+    """Makes caches that are created in this context lie in `cache_dir`."""
     saved = _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES
     _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES = str(cache_dir()), LOCATORS
     try:

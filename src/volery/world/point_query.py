@@ -8,7 +8,6 @@ therefore exact for trees with different scales of height and width, too.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
@@ -17,7 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from volery.core.compiled import cached_here, inner_kernel, kernel, owning_kernel
+from volery.core.compiled import compiled_callback, inner_kernel, kernel, owning_kernel
 from volery.world.embree import (
     CONTEXT_INSTANCE,
     CONTEXT_INSTANCE_PRIMITIVE,
@@ -224,18 +223,13 @@ def _consider(arguments: Any) -> bool:
     return True
 
 
-def _compile_callback(function: Callable[..., Any]) -> Any:
-    with cached_here():
-        return numba.cfunc(types.boolean(types.voidptr), cache=True)(function)
-
-
 _compiled: list[Any] = []
 
 
 def callback_address() -> int:
     """Returns the address of the compiled callback, compiling or loading it at first use."""
     if not _compiled:
-        _compiled.append(_compile_callback(_consider))
+        _compiled.append(compiled_callback(_consider, types.boolean(types.voidptr)))
     return int(_compiled[0].address)
 
 
