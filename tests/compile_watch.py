@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from numba.core import event
-from numba.core.caching import FunctionCache
 
+from volery.core.kernel_cache import KernelCache
 from volery.runtime.warmup.requirements import all_needs
 from volery.runtime.warmup.tasks import do
 
@@ -40,13 +40,13 @@ class NeedsWatch:
 
     def __init__(self) -> None:
         self.needed: list[str] = []
-        load: Any = FunctionCache.load_overload
+        load: Any = KernelCache.load_overload
 
         def note_and_load(cache: Any, signature: Any, context: Any) -> Any:
             _note(self.needed, cache._py_func, signature)
             return load(cache, signature, context)
 
-        FunctionCache.load_overload = note_and_load
+        KernelCache.load_overload = note_and_load
 
 
 def _note(found: list[str], function: Any, types: Any) -> None:

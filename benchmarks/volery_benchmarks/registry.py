@@ -178,8 +178,10 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "start",
-            "Start: from the command to the first frame, and memory of the main job",
+            "Start: the import of `volery`; from the command to the first frame, and memory of the "
+            "main job",
             {
+                "import_ms": Bound(60.0, at_most=True),
                 "first_frame_s_cold": Bound(20.0, at_most=True),
                 "first_frame_s_warm": Bound(3.0, at_most=True),
                 "peak_mb_main_job": Bound(700.0, at_most=True),

@@ -1,4 +1,4 @@
-"""Measures the time from a command to the main job's first LIDAR scan, and the job's memory.
+"""Measures how fast Volery starts: the import, the main job's first LIDAR scan, its memory.
 
 Each figure comes from separate processes: one with an empty cache of compiled kernels, some with a
 filled cache, one that runs the main job with log and report.
@@ -15,6 +15,13 @@ import time
 from pathlib import Path
 
 _WARM_REPEATS = 5
+_IMPORT_REPEATS = 15
+_IMPORT = """
+import time
+start = time.perf_counter()
+import volery
+print(1e3 * (time.perf_counter() - start))
+"""
 _FIRST_FRAME = """
 import volery
 simulation = volery.Simulation(volery.load_scenario("forest_survey"))
@@ -33,11 +40,17 @@ def measure() -> dict[str, float]:
         warm = statistics.median(_first_frame_s(cache) for _ in range(_WARM_REPEATS))
         wall, peak_mb = _main_job(Path(folder), cache)
     return {
+        "import_ms": statistics.median(_import_ms() for _ in range(_IMPORT_REPEATS)),
         "first_frame_s_cold": cold,
         "first_frame_s_warm": warm,
         "peak_mb_main_job": peak_mb,
         "main_job_wall_s": wall,
     }
+
+
+def _import_ms() -> float:
+    command = [sys.executable, "-P", "-c", _IMPORT]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
 def _first_frame_s(cache: Path) -> float:
