@@ -15,14 +15,14 @@ from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.vehicle.airframe import load_airframe
 from volery.world.terrain import Terrain
-from volery_benchmarks import swarm
+from volery_benchmarks import many_uavs
 
 _SLICE = 5
 _ROUNDS = 15
 
 
 def measure() -> dict[str, float]:
-    """Returns medians: ns per drone-step at N = 1000, us per step at N = 1; see `bench.swarm`."""
+    """Returns medians: ns per drone-step at N = 1000, us per step at N = 1; see `many_uavs`."""
     many, one = _fleet(1000), _fleet(1)
     terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
     for fleet in (many, one):
@@ -39,8 +39,8 @@ def measure() -> dict[str, float]:
     return {
         "ns_per_drone_step_n1000": 1e9 * statistics.median(large),
         "us_per_step_n1": 1e6 * statistics.median(small),
-        "realtime_factor_100_drones": swarm.real_time_factor_of_swarm(),
-        "steps_per_s_1024_copies": swarm.steps_a_second_of_copies(),
+        "realtime_factor_100_drones": many_uavs.real_time_factor_of_swarm(),
+        "steps_per_s_1024_copies": many_uavs.steps_a_second_of_copies(),
     }
 
 

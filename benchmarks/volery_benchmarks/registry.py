@@ -338,6 +338,19 @@ BENCHES: dict[str, Bench] = {
             has_quick=True,
         ),
         Bench(
+            "swarm",
+            "Swarm: plans that lead seven birds from random starts into a V; CPU time of a plan "
+            "(ARES, TACAS 2017: 95 % of 8,000 starts, 63 s); flights of seven F450s into a V, and "
+            "into a new one after one or two have landed",
+            {
+                "ares_success": Bound(0.97),
+                "ares_s_mean": Bound(10.0, at_most=True),
+                "recovery_s_one_lost": Bound(20.0, at_most=True),
+                "recovery_success_one_lost": Bound(0.95),
+            },
+            has_quick=True,
+        ),
+        Bench(
             "cluster",
             "Studies of many runs: `hover` for 5 s, 1,000 seeds; runs per second of CPU time of "
             "driver and worker, without the start of the processes; each run a simulation of its "

@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 from volery.core.errors import GraphError
+from volery.runtime.simulation import Simulation
+from volery.scenario.changes import Changes, apply
+from volery.scenario.load import load_scenario
 
 NODE = "/uav1/gap_following"
 
@@ -33,3 +36,8 @@ def test_what_a_node_reads_at_its_start_only_cannot_be_set(simulate, wood_data):
     simulation = simulate(wood_data)
     with pytest.raises(GraphError, match="read-only"):
         simulation.graph.parameters.get(NODE, "route").set([[1.0, 1.0]])
+
+
+def test_a_node_of_the_whole_system_gets_the_names_of_all_uavs():
+    with Simulation(apply(load_scenario("coverage"), Changes(uavs=2))) as simulation:
+        assert simulation.graph.parameters.get("/coverage", "uavs").value == ["uav1", "uav2"]

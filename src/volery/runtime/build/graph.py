@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
@@ -50,6 +51,8 @@ def announce_sensors(
 
 START_POSE = "{start_pose}"
 """Placeholder in a node's parameters for the UAV's start pose: x, y, z, m, and yaw, rad."""
+UAV_NAMES = "{uavs}"
+"""Placeholder in the parameters of a node of the whole system for the names of all UAVs."""
 
 
 def start_nodes(
@@ -79,10 +82,15 @@ def start_nodes(
 
 def _with_start(entry: NodeEntry, start: StartPose) -> NodeEntry:
     """Returns the entry with the start pose in place of `START_POSE`: x, y, z, m; yaw, rad; map."""
-    if START_POSE not in entry.parameters.values():
-        return entry
     pose = [*start.position_map.tolist(), float(rotations.yaw_of(start.attitude))]
-    known = {k: pose if v == START_POSE else v for k, v in entry.parameters.items()}
+    return _filled(entry, START_POSE, pose)
+
+
+def _filled(entry: NodeEntry, placeholder: str, value: Any) -> NodeEntry:
+    """Returns the entry with a value in place of a placeholder in its parameters."""
+    if placeholder not in entry.parameters.values():
+        return entry
+    known = {k: value if v == placeholder else v for k, v in entry.parameters.items()}
     return entry.model_copy(update={"parameters": known})
 
 
@@ -94,7 +102,8 @@ def start_system_nodes(
     for k, entry in enumerate(scenario.nodes):
         context = _context(scenario, entry, graph, engine, now_ns)
         where = f"{scenario.name}: nodes[{k}]"
-        nodes.append(start_node(entry, context, "", where, scenario.access))
+        own = _filled(entry, UAV_NAMES, list(engine.names))
+        nodes.append(start_node(own, context, "", where, scenario.access))
     return nodes
 
 

@@ -1,0 +1,157 @@
+"""Flies a team by a swarm behaviour: to common waypoints, or each UAV to its own goal."""
+
+from __future__ import annotations
+
+import math
+import pkgutil
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.status import publish_status
+from volery.autonomy.swarm.behaviour import (
+    NO_ARENA,
+    Surroundings,
+    SwarmBehaviour,
+    flock_within,
+)
+from volery.autonomy.swarm.olfati_saber import OlfatiSaber
+from volery.autonomy.swarm.team_link import TeamLink
+from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
+from volery.core.arrays import Array
+from volery.core.errors import PlanError
+from volery.core.saved_state import SavedAttributes
+from volery.graph.messages import String
+from volery.graph.nodes.node import Node
+
+_PERIOD_S = 0.05
+_STATUS_PERIODS = 20
+_APPROACH = 0.8
+"""Speed per distance from a goal, 1/s."""
+BEHAVIOURS: dict[str, type[Any]] = {"vasarhelyi": Vasarhelyi, "olfati_saber": OlfatiSaber}
+
+
+class FlockNode(SavedAttributes, Node):
+    """Flies the team `uavs` by a behaviour. Publishes `~/status` (JSON) each second.
+
+    UAVs that do not start with a take-off are waited for.
+
+    Parameters
+    ----------
+    uavs: names of the team.
+    behaviour: `vasarhelyi`, `olfati_saber`, or `module:Class` of a `SwarmBehaviour`.
+    odometry: topic of the odometry, below a UAV's namespace; its frame must be fixed to the map.
+    height_m: height of the flight, m in the map.
+    speed_m_s: speed towards waypoints and goals.
+    waypoints_m: x, y of points to which the whole team flies in turn, m in the map.
+    swaps: whether each UAV flies to the point opposite to its start, seen from the team's middle.
+    arrival_m: distance of the team's middle, or of a UAV, at which a waypoint counts as reached.
+    arena_m: x_min, y_min, x_max, y_max of the walls; empty: there are none.
+    obstacles_m: x, y, radius of obstacles.
+
+    """
+
+    STATE = ("_goals", "_next", "_last_status", "_ticks")
+    PARTS = ("_team",)
+    WARMUP_TASKS = ("volery.autonomy.swarm.warmup:flocking",)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("flock", **options)
+        names = self.declare_parameter("uavs", ["uav1", "uav2", "uav3"]).value
+        self._behaviour = _behaviour(str(self.declare_parameter("behaviour", "vasarhelyi").value))
+        odometry = str(self.declare_parameter("odometry", "odom").value)
+        self._height = self._number("height_m", 5.0, 0.5, 1000.0)
+        self._speed = self._number("speed_m_s", 3.0, 0.0, 100.0)
+        self._waypoints = self._rows("waypoints_m", [[0.0, 0.0]], 2)
+        self._swaps = bool(self.declare_parameter("swaps", False).value)
+        self._arrival = self._number("arrival_m", 3.0, 0.1, 1000.0)
+        arena = self.declare_parameter("arena_m", []).value or NO_ARENA
+        if len(arena) != len(NO_ARENA):
+            raise PlanError("arena_m is [x_min, y_min, x_max, y_max]")
+        obstacles = self._rows("obstacles_m", [], 3)
+        self._around = Surroundings(np.array(arena, float), obstacles)
+        self._goals: Array | None = None
+        """(N, 2) m, map: goals of all UAVs; None: not flying yet."""
+        self._next = 0
+        self._ticks = 0
+        self._last_status = ""
+        self._team = TeamLink(self, names, odometry, self._height)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def _number(self, name: str, default: float, least: float, most: float) -> float:
+        parameter = self.declare_parameter(name, default, min_value=least, max_value=most)
+        return float(parameter.value)
+
+    def _rows(self, name: str, default: list[list[float]], width: int) -> Array:
+        """Returns a parameter of rows of numbers (M, width). Raises `PlanError` for others."""
+        rows = self.declare_parameter(name, default).value
+        if any(len(row) != width for row in rows):
+            raise PlanError(f"{name}: each entry has {width} numbers")
+        return np.array(rows, float).reshape(-1, width)
+
+    def _on_timer(self) -> None:
+        team = self._team
+        if self._goals is None:
+            if not team.is_up():
+                return
+            self._goals = self._first_goals()
+        team.drop_lost(self.get_clock().now_ns())
+        if not team.members:
+            return
+        position, velocity = team.motion()
+        goals = self._goals_now(position)
+        flock = flock_within(position, velocity, self._behaviour.radius_m)
+        wanted = self._behaviour.velocities(flock, self._preferred(goals - position), self._around)
+        for row, level in zip(team.members, wanted, strict=True):
+            team.command(row, level, self._height)
+        self._ticks += 1
+        if self._ticks % _STATUS_PERIODS == 0:
+            self._publish_status(position, velocity, goals)
+
+    def _first_goals(self) -> Array:
+        position, _ = self._team.motion()
+        return 2.0 * position.mean(axis=0) - position
+
+    def _goals_now(self, position: Array) -> Array:
+        """Returns the present goals (M, 2) of the members; common ones keep the team's shape."""
+        if self._swaps and self._goals is not None:
+            return self._goals[self._team.members]
+        middle = position.mean(axis=0)
+        to_go = float(np.hypot(*(self._waypoints[self._next] - middle)))
+        if to_go < self._arrival and self._next + 1 < len(self._waypoints):
+            self._next += 1
+        return position + (self._waypoints[self._next] - middle)
+
+    def _preferred(self, ways: Array) -> Array:
+        """Returns velocities (M, 2) along ways (M, 2) m to the goals."""
+        distance = np.linalg.norm(ways, axis=1, keepdims=True)
+        speed = np.minimum(self._speed, _APPROACH * distance)
+        return ways / np.maximum(distance, 1e-9) * speed
+
+    def _publish_status(self, position: Array, velocity: Array, goals: Array) -> None:
+        apart = np.linalg.norm(position[:, None] - position, axis=2)
+        apart[np.diag_indices(len(apart))] = math.inf
+        headings = velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9)
+        arrived = np.linalg.norm(goals - position, axis=1) < self._arrival
+        status = {
+            "members": len(position),
+            "waypoint": self._next,
+            "arrived": int(arrived.sum()),
+            "order": round(float(np.linalg.norm(headings.mean(axis=0))), 3),
+            "least_distance_m": round(float(apart.min()), 3) if len(apart) > 1 else None,
+        }
+        self._last_status = publish_status(self._status, status, self._last_status)
+
+
+def _behaviour(name: str) -> SwarmBehaviour:
+    """Returns a behaviour by name. Raises `PlanError` if there is none."""
+    try:
+        kind = BEHAVIOURS.get(name) or pkgutil.resolve_name(name)
+        behaviour: SwarmBehaviour = kind()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        known = ", ".join(BEHAVIOURS)
+        raise PlanError(
+            f"no swarm behaviour '{name}' ({error}); {known}, or module:Class"
+        ) from None
+    return behaviour

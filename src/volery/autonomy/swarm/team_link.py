@@ -1,0 +1,88 @@
+"""A node's link to the UAVs of its team: their odometry, and their velocity commands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
+from volery.core.saved_state import SavedAttributes
+from volery.graph.messages import Odometry, Twist, Vector3
+from volery.graph.nodes.node import Node
+
+_SILENCE_S = 1.0
+"""Time without odometry after which a UAV is lost."""
+_LOW = 0.4
+"""Part of the flight height below which a UAV is lost, or still climbs."""
+_CLIMB_GAIN, _MAX_CLIMB_M_S = 1.2, 1.0
+_STILL_M_S = 0.2
+
+
+class TeamLink(SavedAttributes):
+    """Connects a node with N UAVs; a part of its state.
+
+    odometry: name of the topic below the UAVs' namespaces; height_m: of the flight, in the map.
+    """
+
+    STATE = ("_samples", "members")
+
+    def __init__(self, node: Node, names: Sequence[str], odometry: str, height_m: float) -> None:
+        self.names = tuple(names)
+        self.members = list(range(len(self.names)))
+        """Rows of the UAVs that are not lost."""
+        self._low_m = _LOW * height_m
+        self._samples: list[OdometrySample | None] = [None] * len(self.names)
+        for row, name in enumerate(self.names):
+            node.create_subscription(Odometry, f"/{name}/{odometry}", self._listener(row), 1)
+        self._commands = [node.create_publisher(Twist, f"/{n}/cmd_vel", 1) for n in self.names]
+
+    def _listener(self, row: int) -> Callable[[Any], None]:
+        def on_odometry(message: Any) -> None:
+            self._samples[row] = OdometrySample.from_odometry(message)
+
+        return on_odometry
+
+    def is_up(self) -> bool:
+        """Returns whether all UAVs are in the air and none climbs."""
+        return all(
+            sample is not None
+            and sample.position[2] > self._low_m
+            and abs(sample.velocity[2]) < _STILL_M_S
+            for sample in self._samples
+        )
+
+    def drop_lost(self, now_ns: int) -> list[str]:
+        """Removes silent and low UAVs from the members; returns their names."""
+        lost = [row for row in self.members if not self._is_there(row, now_ns)]
+        self.members = [row for row in self.members if row not in lost]
+        return [self.names[row] for row in lost]
+
+    def _is_there(self, row: int, now_ns: int) -> bool:
+        sample = self._samples[row]
+        if sample is None or now_ns - sample.time_ns > _SILENCE_S * NS_PER_S:
+            return False
+        return bool(sample.position[2] > self._low_m)
+
+    def motion(self) -> tuple[Array, Array]:
+        """Returns positions (M, 2) m and velocities (M, 2) m/s of the members; all have one."""
+        samples = [sample for row in self.members if (sample := self._samples[row]) is not None]
+        position = np.array([sample.position[:2] for sample in samples]).reshape(-1, 2)
+        velocity = np.array([sample.velocity[:2] for sample in samples]).reshape(-1, 2)
+        return position, velocity
+
+    def command(self, row: int, level: Array, height_m: float) -> None:
+        """Commands a UAV a horizontal velocity (2,) m/s in the map, at a height."""
+        sample = self._samples[row]
+        if sample is None:
+            return
+        climb = _CLIMB_GAIN * (height_m - float(sample.position[2]))
+        c, s = math.cos(sample.yaw), math.sin(sample.yaw)
+        forward, left = c * level[0] + s * level[1], c * level[1] - s * level[0]
+        up = max(-_MAX_CLIMB_M_S, min(_MAX_CLIMB_M_S, climb))
+        linear = Vector3(float(forward), float(left), float(up))
+        self._commands[row].publish(Twist(linear, Vector3(0.0, 0.0, 0.0)))

@@ -1,0 +1,359 @@
+"""Flies a team into a V and keeps it in one: ARES plans while the team flies.
+
+Each UAV follows a bird, a point that moves as the plan says. A bird's wing span is a length, its
+step a time; its upwash measures the formation and acts on no multirotor.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from volery.autonomy.status import publish_status
+from volery.autonomy.swarm.ares import AresPlan, AresSearch, AresSettings
+from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
+from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
+from volery.autonomy.swarm.team_link import TeamLink
+from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
+from volery.core.saved_state import SavedAttributes
+from volery.graph.messages import String
+from volery.graph.nodes.node import Node
+
+_PERIOD_S = 0.05
+_GAIN = 0.8
+"""Velocity per distance from the bird, 1/s."""
+_OVERSPEED = 1.5
+"""Limit of commanded speeds, in speeds of a plan: UAVs catch up with their birds."""
+_NEAR_M = 0.4
+_DISPLACED = 1.5
+"""Distance from its bird, in wing spans, at which a UAV counts as displaced."""
+_CROSSING_M = 0.5
+"""Height difference of UAVs whose ways to the start positions cross."""
+_BOX = 3.0
+"""Side of the box of random starts of seven, in wing spans, after ARES; it grows with the area."""
+_SEVEN = 7
+_SPEEDS = (0.25, 0.75)
+"""Random start velocities per axis, in wing spans per step, after ARES."""
+_MOST_DRAWS = 10_000
+_MOST_LEAD = 8
+"""Most steps that a search may last."""
+_MOST_KICKS = 10
+"""Random changes of the velocities after searches in vain, until the best plan is flown."""
+_APART = 1.2
+"""Least distance of random starts, in wing spans."""
+
+
+class VFormationPhase(StrEnum):
+    """What the team does."""
+
+    ASCEND = "ascend"
+    """Takes off, or waits for all odometry."""
+    GATHER = "gather"
+    """Flies to the drawn start positions."""
+    SEARCH = "search"
+    """Flies straight on while a plan is searched."""
+    REFORM = "reform"
+    """Follows a plan."""
+    CRUISE = "cruise"
+    """Flies on after a plan."""
+
+
+class VFormation(SavedAttributes, Node):
+    """Flies the team `uavs` into a V. Publishes `~/status` (JSON) after each step of the birds.
+
+    The team gathers at random positions with random velocities, like the starts of ARES, and
+    searches a plan from there, a slice each 50 ms. It searches anew when a UAV leaves the team, is
+    displaced, or the formation is lost. UAVs that do not start with a take-off are waited for.
+
+    Parameters
+    ----------
+    uavs: names of the team.
+    odometry: topic of the odometry, below a UAV's namespace; its frame must be fixed to the map.
+    wing_span_m: wing span of a bird; the UAVs of a V are 1.9 of them apart sideways, 1 ahead.
+    step_s: duration of a bird's step.
+    height_m: height of the formation, m in the map.
+    height_step_m: height by which every second UAV flies above the others.
+    min_distance: distance that plans keep between birds, in wing spans.
+    max_speed_m_s: speed that plans do not exceed.
+    max_acceleration_m_s2: change of a bird's velocity that plans do not exceed, over its step.
+    slices: searches of a clone in each period of 50 ms.
+    lost_cost: cost of the formation above which a V is lost.
+    seed: of starts and searches.
+    gathers: whether the team first flies to random positions.
+
+    """
+
+    STATE = (
+        *("phase", "_bird", "_velocity", "_search", "_plan", "_step"),
+        *("_step_ns", "_lost_steps", "_num_searches", "_num_kicks", "_lead"),
+        *("_last_status", "_note", "_solved_ns"),
+    )
+
+    PARTS = ("_team",)
+    WARMUP_TASKS = ("volery.autonomy.swarm.warmup:formation_search",)
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("v_formation", **options)
+        names = self.declare_parameter("uavs", [f"uav{k + 1}" for k in range(_SEVEN)]).value
+        odometry = str(self.declare_parameter("odometry", "odom").value)
+        self._span = self._number("wing_span_m", 3.0, 0.1, 100.0)
+        self._duration_s = self._number("step_s", 2.0, 0.1, 100.0)
+        self._height = self._number("height_m", 5.0, 0.5, 1000.0)
+        self._height_step = self._number("height_step_m", 0.0, 0.0, 100.0)
+        distance = self._number("min_distance", 1.0, 0.0, 1.5)
+        self._slices = int(self.declare_parameter("slices", 10, min_value=1, max_value=1000).value)
+        self._lost_cost = self._number("lost_cost", 0.1, 1e-3, 1e3)
+        self._seed = int(self.declare_parameter("seed", 1, min_value=0).value)
+        self._gathers = bool(self.declare_parameter("gathers", True).value)
+        self._max_speed = max_speed = self._number("max_speed_m_s", 4.0, 0.1, 100.0)
+        acceleration = self._number("max_acceleration_m_s2", 1.0, 0.01, 100.0)
+        limits = FlockLimits(
+            distance,
+            max_speed * self._duration_s / self._span,
+            acceleration * self._duration_s**2 / self._span,
+        )
+        self._settings = AresSettings(limits=limits)
+
+        self.phase = VFormationPhase.ASCEND
+        self._bird = np.zeros((len(names), 2))
+        """(N, 2) m, map: positions that the UAVs follow."""
+        self._velocity = np.zeros((len(names), 2))
+        """(N, 2) m/s, map: velocities of the birds."""
+        self._search: AresSearch | None = None
+        self._plan: AresPlan | None = None
+        self._step = 0
+        self._step_ns = 0
+        """Time at which the present step ends, ns."""
+        self._lost_steps = 0
+        self._num_searches = 0
+        self._num_kicks = 0
+        self._lead = 0
+        """Steps that the birds fly straight before a plan begins; 0: they hover."""
+        self._solved_ns = -1
+        """Time of the first V, ns; -1: none so far."""
+        self._note = ""
+        self._last_status = ""
+
+        self._team = TeamLink(self, names, odometry, self._height)
+        self._status = self.create_publisher(String, "~/status", 1, latched=True)
+        self.create_timer(_PERIOD_S, self._on_timer)
+
+    def _number(self, name: str, default: float, least: float, most: float) -> float:
+        parameter = self.declare_parameter(name, default, min_value=least, max_value=most)
+        return float(parameter.value)
+
+    # ------------------------------------------------------------------------------- behaviour
+
+    def _on_timer(self) -> None:
+        now_ns = self.get_clock().now_ns()
+        if self.phase is VFormationPhase.ASCEND:
+            if self._team.is_up():
+                self._begin(now_ns)
+            return
+        self._drop_lost(now_ns)
+        if not self._team.members:
+            return
+        if self.phase is VFormationPhase.GATHER:
+            if self._has_gathered():
+                self._set_off(now_ns)
+        else:
+            if not self._hovers:
+                self._bird[self._team.members] += self._velocity[self._team.members] * _PERIOD_S
+            if self.phase is VFormationPhase.SEARCH:
+                self._continue_search(now_ns)
+            if self.phase is not VFormationPhase.SEARCH and now_ns >= self._step_ns:
+                self._end_step(now_ns)
+        self._steer()
+
+    def _begin(self, now_ns: int) -> None:
+        self._bird[:] = self._team.motion()[0]
+        if self._gathers:
+            middle = self._bird.mean(axis=0)
+            self._bird[:] = middle + self._span * self._drawn_start(self._bird - middle)
+            self.phase = VFormationPhase.GATHER
+        else:
+            self._set_off(now_ns)
+
+    def _drawn_start(self, offsets: Array) -> Array:
+        """Returns random positions (N, 2), wing spans, sorted so that the ways hardly cross."""
+        count = len(offsets)
+        rng = np.random.default_rng(self._seed)
+        side = _BOX * math.sqrt(max(1.0, count / _SEVEN))
+        found: list[Array] = []
+        for _ in range(_MOST_DRAWS):
+            drawn = rng.uniform(-0.5 * side, 0.5 * side, 2)
+            if all(math.dist(drawn, other) >= _APART for other in found):
+                found.append(drawn)
+            if len(found) == count:
+                break
+        else:  # too dense: a grid
+            width = math.ceil(math.sqrt(count))
+            found = [np.array([k % width, k // width], float) * _APART for k in range(count)]
+        along = np.argsort(offsets[:, 0], kind="stable")
+        drawn = np.array(sorted(found, key=lambda place: float(place[0])))
+        placed = np.empty((count, 2))
+        placed[along] = drawn
+        return placed
+
+    @property
+    def _hovers(self) -> bool:
+        return self.phase is VFormationPhase.SEARCH and self._lead == 0
+
+    def _has_gathered(self) -> bool:
+        position, _ = self._team.motion()
+        return bool((np.abs(position - self._bird[self._team.members]) < _NEAR_M).all())
+
+    def _set_off(self, now_ns: int) -> None:
+        """Searches the first plan, with random velocities; the UAVs hover until it is found."""
+        rng = np.random.default_rng([self._seed, 1])
+        speed = rng.uniform(*_SPEEDS, self._velocity.shape)
+        self._velocity[:] = speed * self._span / self._duration_s
+        self._num_kicks, self._lead = 0, 0
+        self._begin_search(now_ns, "start")
+
+    def _begin_search(self, now_ns: int, reason: str) -> None:
+        """Searches a plan that begins `_lead` steps from now, until when the birds fly straight."""
+        self._note, self.phase = reason, VFormationPhase.SEARCH
+        self._plan, self._lost_steps = None, 0
+        self._step_ns = now_ns + round(self._lead * self._duration_s * NS_PER_S)
+        self._num_searches += 1
+        flock = self._flock(self._lead)
+        self._search = AresSearch(
+            flock[:2].T, flock[2:].T, self._seed + self._num_searches, self._settings
+        )
+        self._publish_status()
+
+    def _flock(self, steps: int) -> Array:
+        """Returns the flock (4, N) after steps straight on, in wing spans and steps."""
+        velocity = self._velocity[self._team.members] * self._duration_s
+        position = self._bird[self._team.members] + steps * velocity
+        flock: Array = np.concatenate((position.T, velocity.T)) / self._span
+        return flock
+
+    def _search_anew(self, now_ns: int, reason: str) -> None:
+        """Searches from the flight, which has changed."""
+        self._num_kicks, self._lead = 0, 1
+        self._begin_search(now_ns, reason)
+
+    def _advance_search(self) -> bool:
+        """Returns whether the search has ended."""
+        search = self._search
+        for _ in range(self._slices):
+            if search is None or search.is_done:
+                return True
+            search.advance()
+        return False
+
+    def _continue_search(self, now_ns: int) -> None:
+        has_ended, search = self._advance_search(), self._search
+        if search is None or now_ns < self._step_ns:
+            return
+        if not has_ended:
+            if self._lead:  # straight ways of unlike velocities: the plan would begin elsewhere
+                self._lead = min(2 * self._lead, _MOST_LEAD)
+                self._begin_search(now_ns, "the search has used up its time")
+            return
+        plan = search.plan()
+        if not plan.is_solved and self._num_kicks < _MOST_KICKS:
+            self._kick()
+            self._begin_search(now_ns, f"no plan ends in a V: cost {plan.cost:.2g}")
+            return
+        self._plan, self._search, self._step = plan, None, 0
+        self.phase = VFormationPhase.REFORM
+
+    def _kick(self) -> None:
+        """Changes all velocities at random: from elsewhere, another search finds its way."""
+        self._num_kicks += 1
+        rng = np.random.default_rng([self._seed, 2, self._num_searches])
+        rows, steps = self._team.members, max(1, self._lead)
+        least = self._settings.limits.min_distance
+        before, kept = self._flock(0), self._velocity[self._team.members].copy()
+        for _ in range(_MOST_DRAWS // 10):
+            size = rng.uniform(0.0, 0.7, len(rows)) * np.linalg.norm(kept, axis=1)
+            way = rng.uniform(-math.pi, math.pi, len(rows))
+            self._velocity[rows] = kept + (size * np.array([np.cos(way), np.sin(way)])).T
+            if approach_margin(before, self._flock(steps), least) >= 0.0:
+                return
+        self._velocity[rows] = kept
+
+    def _end_step(self, now_ns: int) -> None:
+        """Passes to the next step of the birds."""
+        self._step_ns = now_ns + round(self._duration_s * NS_PER_S)
+        if self.phase is VFormationPhase.REFORM and self._plan is not None:
+            self._step += 1
+            if self._step < len(self._plan.velocities):
+                scale = self._span / self._duration_s
+                self._velocity[self._team.members] = self._plan.velocities[self._step] * scale
+            else:
+                rows = self._team.members
+                self.phase = VFormationPhase.CRUISE
+                self._velocity[rows] = self._velocity[rows].mean(axis=0)
+        if self.phase is VFormationPhase.CRUISE:
+            self._look(now_ns)
+        self._publish_status()
+
+    def _look(self, now_ns: int) -> None:
+        """Searches anew where the formation has been lost for some steps."""
+        cost = self._fitness().cost
+        if cost <= self._lost_cost:
+            self._lost_steps = 0
+            if self._solved_ns < 0:
+                self._solved_ns = now_ns
+            return
+        self._lost_steps += 1
+        if self._lost_steps > 2:
+            self._search_anew(now_ns, f"the formation is lost: cost {cost:.2g}")
+
+    def _drop_lost(self, now_ns: int) -> None:
+        """Removes lost UAVs from the team; takes over the positions of displaced ones."""
+        lost = ", ".join(self._team.drop_lost(now_ns))
+        if self.phase is VFormationPhase.GATHER or not self._team.members:
+            return
+        rows = np.array(self._team.members)
+        position, _ = self._team.motion()
+        offset = np.abs(position - self._bird[rows]).max(axis=1)
+        displaced = offset > _DISPLACED * self._span
+        self._bird[rows[displaced]] = position[displaced]
+        if lost or displaced.any():
+            self._search_anew(now_ns, f"{lost} left" if lost else "a UAV was displaced")
+
+    def _steer(self) -> None:
+        """Commands the members towards their birds."""
+        rows = self._team.members
+        position, _ = self._team.motion()
+        is_still = self.phase is VFormationPhase.GATHER or self._hovers
+        ahead = np.zeros((len(rows), 2)) if is_still else self._velocity[rows]
+        wanted = ahead + _GAIN * (self._bird[rows] - position)
+        for row, level in zip(rows, wanted, strict=True):
+            speed = float(np.hypot(*level))
+            height = self._height + self._height_step * (row % 2)
+            if self.phase is VFormationPhase.GATHER:
+                height += _CROSSING_M * (row % 3)
+            part = min(1.0, _OVERSPEED * self._max_speed / max(speed, 1e-9))
+            self._team.command(row, part * level, height)
+
+    # ---------------------------------------------------------------------------------- status
+
+    def _fitness(self) -> FormationFitness:
+        """Returns the fitness of the measured formation."""
+        position, velocity = self._team.motion()
+        return formation_fitness(position / self._span, velocity * self._duration_s / self._span)
+
+    def _publish_status(self) -> None:
+        fitness = self._fitness()
+        status = {
+            "phase": str(self.phase),
+            "members": [self._team.names[row] for row in self._team.members],
+            "cost": round(fitness.cost, 6),
+            "velocity_matching": round(fitness.velocity_matching, 6),
+            "clear_view": round(fitness.clear_view, 6),
+            "upwash": round(fitness.upwash, 6),
+            "searches": self._num_searches,
+            "reason": self._note,
+            "time_to_v_s": None if self._solved_ns < 0 else self._solved_ns / NS_PER_S,
+        }
+        self._last_status = publish_status(self._status, status, self._last_status)

@@ -1,0 +1,116 @@
+"""The node that flies a team by a behaviour, with UAVs that follow commands at once."""
+
+import copy
+
+import numpy as np
+import pytest
+from swarm_team import SwarmTeam
+
+from volery.autonomy.swarm.flock import FlockNode
+
+BEHAVIOURS = ("vasarhelyi", "olfati_saber")
+GRID = [[5.0 * x, 5.0 * y, 5.0] for x in range(3) for y in range(3)]
+
+
+class Away:
+    """A behaviour of one's own: all fly along y."""
+
+    radius_m = 1.0
+
+    def velocities(self, flock, preferred, around):
+        return np.tile([0.0, 1.0], (len(flock.position), 1))
+
+
+def distances(position):
+    apart = np.linalg.norm(position[:, None] - position, axis=2)
+    return apart + np.diag(np.full(len(apart), np.inf))
+
+
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_a_team_flies_to_its_waypoints_in_turn(behaviour):
+    team = SwarmTeam(FlockNode, GRID, behaviour=behaviour, waypoints_m=[[40.0, 5.0], [40.0, 45.0]])
+    team.fly_until(lambda status: status["waypoint"] == 1)
+    assert abs(team.positions[:, 0].mean() - 40.0) < 5.0
+    team.fly_until(lambda status: status["arrived"] == 9)
+    assert abs(team.positions[:, 1].mean() - 45.0) < 5.0
+    assert distances(team.positions).min() > 2.0
+
+
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_a_team_swaps_across_its_middle_without_contact(behaviour):
+    angle = np.arange(6) * np.pi / 3.0
+    ring = np.stack([15.0 * np.cos(angle), 15.0 * np.sin(angle), np.full(6, 5.0)], axis=1)
+    team = SwarmTeam(FlockNode, ring, behaviour=behaviour, swaps=True)
+    least = np.inf
+    for _ in range(600):
+        team.fly(0.1)
+        least = min(least, distances(team.positions).min())
+    assert least > 1.0
+    assert team.status["least_distance_m"] > 1.0
+
+
+def test_a_team_keeps_its_height_and_stays_in_its_arena():
+    arena = [-10.0, -10.0, 30.0, 20.0]
+    team = SwarmTeam(FlockNode, GRID, height_m=6.0, arena_m=arena, waypoints_m=[[100.0, 5.0]])
+    team.fly(60.0)
+    np.testing.assert_allclose(team.positions[:, 2], 6.0, atol=0.1)
+    assert team.positions[:, 0].max() < 30.0
+
+
+def test_a_team_avoids_its_obstacles():
+    team = SwarmTeam(
+        FlockNode, [[0.0, 0.0, 5.0]], waypoints_m=[[40.0, 1.0]], obstacles_m=[[20.0, 0.2, 1.0]]
+    )
+    least = np.inf
+    for _ in range(400):
+        team.fly(0.1)
+        least = min(least, np.hypot(*(team.positions[0, :2] - [20.0, 0.2])))
+    assert least > 1.3
+    assert team.positions[0, 0] > 38.0
+
+
+def test_the_team_flies_on_without_a_lost_uav():
+    team = SwarmTeam(FlockNode, GRID, waypoints_m=[[40.0, 5.0]])
+    team.fly(3.0)
+    team.silent.add(4)
+    team.fly_until(lambda status: status["members"] == 8)
+    team.fly_until(lambda status: status["arrived"] == 8)
+
+
+def test_a_behaviour_of_ones_own():
+    team = SwarmTeam(FlockNode, GRID, behaviour=f"{__name__}:Away")
+    before = team.positions.copy()
+    team.fly(5.0)
+    moved = team.positions - before
+    assert (moved[:, 1] > 3.0).all()
+    np.testing.assert_allclose(moved[:, 0], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"behaviour": "murmuration"}, "no swarm behaviour 'murmuration'"),
+        ({"behaviour": "volery.autonomy.swarm.flock:Nothing"}, "no swarm behaviour"),
+        ({"waypoints_m": [[1.0, float("nan")]]}, "not finite"),
+        ({"arena_m": [1.0, 2.0]}, "arena_m is"),
+        ({"obstacles_m": [[1.0, 2.0]]}, "each entry has 3 numbers"),
+    ],
+)
+def test_wrong_parameters_are_refused(parameters, words):
+    with pytest.raises(Exception, match=words):
+        SwarmTeam(FlockNode, GRID, **parameters)
+
+
+def test_a_snapshot_continues_the_same_flight():
+    team = SwarmTeam(FlockNode, GRID, waypoints_m=[[40.0, 5.0]])
+    team.fly(5.0)
+    kept = copy.deepcopy(team.node.get_state())
+    start, speeds, time_ns = team.positions.copy(), team.velocities.copy(), team.now_ns
+    team.fly(5.0)
+    end = team.positions.copy()
+    again = SwarmTeam(FlockNode, GRID, waypoints_m=[[40.0, 5.0]])
+    again.run_to(time_ns)
+    again.node.set_state(kept)
+    again.positions, again.velocities = start, speeds
+    again.fly(5.0)
+    np.testing.assert_array_equal(again.positions, end)

@@ -1,0 +1,99 @@
+"""The node that flies a team into a V, with UAVs that follow commands at once."""
+
+import numpy as np
+import pytest
+from swarm_team import SwarmTeam
+
+from volery.autonomy.swarm.v_formation import VFormation
+
+
+class Team(SwarmTeam):
+    """UAVs in a row, 3 m apart."""
+
+    def __init__(self, count=7, **parameters):
+        row = [[3.0 * k, 0.0, 5.0] for k in range(count)]
+        super().__init__(VFormation, row, **{"step_s": 2.0, "slices": 200, **parameters})
+
+
+def is_v(status):
+    return status["phase"] == "cruise" and status["cost"] < 0.1
+
+
+@pytest.fixture(scope="module")
+def flown():
+    team = Team()
+    team.fly_until(is_v)
+    return team
+
+
+def test_a_team_from_a_row_flies_into_a_v(flown):
+    assert flown.status["members"] == flown.names
+    assert flown.status["upwash"] > 5.5
+    assert flown.status["time_to_v_s"] is not None
+
+
+def test_it_flies_on_in_the_v(flown):
+    before = flown.positions.copy()
+    searches = flown.status["searches"]
+    flown.fly(20.0)
+    assert is_v(flown.status)
+    assert flown.status["searches"] == searches
+    assert np.linalg.norm(flown.positions - before, axis=1).min() > 5.0
+
+
+def test_a_team_that_loses_a_uav_forms_a_v_of_the_others():
+    team = Team()
+    team.fly_until(is_v)
+    team.silent.add(3)
+    team.fly_until(lambda status: "uav4" not in status["members"])
+    assert team.status["reason"] == "uav4 left"
+    team.fly_until(is_v)
+    assert len(team.status["members"]) == 6
+    assert team.status["upwash"] > 4.5
+
+
+def test_a_displaced_uav_returns_into_a_v():
+    team = Team()
+    team.fly_until(is_v)
+    searches = team.status["searches"]
+    team.positions[2] += (8.0, 5.0, 0.0)
+    team.fly_until(lambda status: status["searches"] > searches)
+    assert team.status["reason"] == "a UAV was displaced"
+    team.fly_until(is_v)
+
+
+def test_a_search_that_takes_too_long_says_so_and_the_team_flies_straight():
+    team = Team(slices=1)
+    team.fly_until(is_v)
+    team.silent.add(3)
+    team.fly_until(
+        lambda status: status["phase"] == "search" and "used up its time" in status["reason"]
+    )
+    speeds = team.velocities.copy()
+    team.fly(0.5)
+    np.testing.assert_allclose(team.velocities[:, :2], speeds[:, :2], atol=0.02)
+
+
+def test_uavs_keep_their_height_and_every_second_flies_above():
+    team = Team(height_m=6.0, height_step_m=0.8)
+    team.fly_until(is_v)
+    heights = team.positions[:, 2]
+    np.testing.assert_allclose(heights[::2], 6.0, atol=0.1)
+    np.testing.assert_allclose(heights[1::2], 6.8, atol=0.1)
+
+
+def test_the_same_seed_gives_the_same_flight():
+    ends = []
+    for _ in range(2):
+        team = Team(count=3, seed=7)
+        team.fly(40.0)
+        ends.append(team.positions.tobytes())
+    assert ends[0] == ends[1]
+
+
+def test_it_waits_for_all_uavs():
+    team = Team(count=3)
+    team.silent.add(1)
+    team.fly(10.0)
+    assert team.node.phase == "ascend"
+    assert not team.velocities.any()
