@@ -51,6 +51,7 @@ VIEWS = {
     "city_flight": CardView(12.0, (-2.4, -0.9, 0.9), 70.0),
     "cooperative_search": CardView(12.0, (-1.9, -1.1, 0.8), 65.0),
     "coverage": CardView(20.0, (-2.2, -1.8, 1.3), 75.0),
+    "flock": CardView(14.0, (-9.0, -7.0, 6.0), 75.0),
     "forest_cameras": CardView(10.0, (-1.7, -0.6, 0.45), 70.0),
     "forest_procedural": CardView(10.0, (-1.7, -0.7, 0.5), 70.0),
     "forest_rain": CardView(10.0, (-1.5, -0.6, 0.4), 70.0, hour_of_day=12.0),
@@ -64,6 +65,7 @@ VIEWS = {
     "policy_homing": CardView(6.0, (-1.5, -1.0, 0.6)),
     "servoing": CardView(2.3, (-1.5, -1.0, 1.4), 65.0),
     "swarm_100": CardView(8.0, (-0.5, -0.35, 0.12), 75.0),
+    "v_formation": CardView(45.0, (-9.0, -7.0, 8.0), 80.0),
 }
 
 
@@ -99,6 +101,10 @@ def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
     data["types"][_TYPE] = {"airframe": "crazyflie", "plant": "kinematic", "sensors": [camera]}
     if view.hour_of_day is not None:
         data["world"]["light"]["hour_of_day"] = view.hour_of_day
+    names = [f"uav{k + 1}" for k in range(scenario.uav_count)]
+    for node in data.get("nodes", ()):  # their teams are without the photographer
+        own = node.get("parameters", {})
+        node["parameters"] = {k: names if v == "{uavs}" else v for k, v in own.items()}
     first = scenario.uavs[0].position_m
     waiting = {"type": _TYPE, "position_m": (first[0], first[1], _STUDIO_M)}
     data["uavs"] = [*data["uavs"], waiting]

@@ -58,11 +58,15 @@ NODES = {
     "radio": {"topics": ["odom nav_msgs/msg/Odometry"], "station_id": 1},
     "mavlink_autopilot": {},
     "policy": {"goal": [3.0, 1.0, 4.0]},
+    "flock": {"uavs": ["uav1", "uav2"], "waypoints_m": [[3.0, 1.0]]},
+    "v_formation": {"uavs": ["uav1", "uav2"]},
 }
 """Nodes and their parameters."""
 OF_THE_WORLD = (
     "coverage",
     "map_merging",
+    "flock",
+    "v_formation",
 )
 """Nodes of no UAV."""
 RATE_HZ = 250

@@ -11,9 +11,9 @@ from volery.cli.error_reporting import guarded
 
 _BENCHES = (
     "lidar, fleet, camera, dynamics, reset, start, bridge, ros2, coverage, avoidance, search, "
-    "mavlink, comms, page, forest_search, load, hostile, cluster, learning, peers"
+    "mavlink, comms, page, forest_search, load, hostile, cluster, swarm, learning, peers"
 )
-_QUICK = "lidar, forest_search, load, hostile, cluster"
+_QUICK = "lidar, forest_search, load, hostile, cluster, swarm"
 
 
 @guarded

@@ -111,23 +111,27 @@ class FlockNode(SavedAttributes, Node):
 
     def _first_goals(self) -> Array:
         position, _ = self._team.motion()
-        return 2.0 * position.mean(axis=0) - position
+        opposite: Array = 2.0 * position.mean(axis=0) - position
+        return opposite
 
     def _goals_now(self, position: Array) -> Array:
         """Returns the present goals (M, 2) of the members; common ones keep the team's shape."""
         if self._swaps and self._goals is not None:
-            return self._goals[self._team.members]
+            own: Array = self._goals[self._team.members]
+            return own
         middle = position.mean(axis=0)
         to_go = float(np.hypot(*(self._waypoints[self._next] - middle)))
         if to_go < self._arrival and self._next + 1 < len(self._waypoints):
             self._next += 1
-        return position + (self._waypoints[self._next] - middle)
+        goals: Array = position + (self._waypoints[self._next] - middle)
+        return goals
 
     def _preferred(self, ways: Array) -> Array:
         """Returns velocities (M, 2) along ways (M, 2) m to the goals."""
         distance = np.linalg.norm(ways, axis=1, keepdims=True)
         speed = np.minimum(self._speed, _APPROACH * distance)
-        return ways / np.maximum(distance, 1e-9) * speed
+        preferred: Array = ways / np.maximum(distance, 1e-9) * speed
+        return preferred
 
     def _publish_status(self, position: Array, velocity: Array, goals: Array) -> None:
         apart = np.linalg.norm(position[:, None] - position, axis=2)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volery.core.arrays import Array
-from volery.core.compiled import inline_kernel, inner_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 from volery.core.errors import PlanError
 
 WING_SPAN = 1.0
@@ -92,10 +92,11 @@ def fitness_parts(flock: Any) -> tuple[float, float, float]:
 def fitness_cost(flock: Any) -> float:
     """Returns the cost of a flock (4, N), 0 for a V."""
     matching, view, upwash = fitness_parts(flock)
-    return cost_of(flock.shape[1], matching, view, upwash)
+    cost: float = cost_of(flock.shape[1], matching, view, upwash)
+    return cost
 
 
-@inline_kernel
+@inner_kernel
 def cost_of(count: int, matching: float, view: float, upwash: float) -> float:
     """Returns the cost of a flock of `count` birds by the parts of its fitness."""
     missing = count - 1 - upwash
@@ -110,7 +111,8 @@ def mismatch(flock: Any, i: int, j: int) -> float:
     if total <= 0.0:
         return 0.0
     dx, dy = (vx - ux) / total, (vy - uy) / total
-    return dx * dx + dy * dy
+    square: float = dx * dx + dy * dy
+    return square
 
 
 @inner_kernel
@@ -131,7 +133,7 @@ def seen_by(flock: Any, i: int, j: int) -> tuple[float, float]:
     return _blocked(aside, ahead), _air(aside, ahead, cosine)
 
 
-@inline_kernel
+@inner_kernel
 def _blocked(aside: float, ahead: float) -> float:
     """Returns which part of the view a bird blocks with its wings, in half angles of the view."""
     low = max(math.atan2(ahead, aside + WING_SPAN), 0.5 * math.pi - _CONE)
@@ -139,7 +141,7 @@ def _blocked(aside: float, ahead: float) -> float:
     return max(0.0, high - low) / _CONE
 
 
-@inline_kernel
+@inner_kernel
 def _air(aside: float, ahead: float, cosine: float) -> float:
     """Returns the upwash of a bird ahead, or minus its downwash."""
     smooth = math.erf(_EDGE * (aside - _DOWNWASH_ASIDE))

@@ -14,7 +14,7 @@ import numpy as np
 
 from volery.autonomy.swarm.behaviour import Flock, Surroundings
 from volery.core.arrays import Array
-from volery.core.compiled import inline_kernel, inner_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 
 _EPSILON = 0.1
 """Of the smooth norm."""
@@ -139,18 +139,18 @@ def _of_obstacle(
     return force * x + match * ux, force * y + match * uy
 
 
-@inline_kernel
+@inner_kernel
 def _smooth(square: float) -> float:
     """Returns the smooth norm of a vector with this square."""
     return (math.sqrt(1.0 + _EPSILON * square) - 1.0) / _EPSILON
 
 
-@inline_kernel
+@inner_kernel
 def _sigmoid(x: float) -> float:
     return x / math.sqrt(1.0 + x * x)
 
 
-@inline_kernel
+@inner_kernel
 def _bump(x: float, flat: float) -> float:
     """Returns 1 up to `flat`, falling to 0 at 1."""
     if x < flat:

@@ -21,6 +21,8 @@ _LOW = 0.4
 """Part of the flight height below which a UAV is lost, or still climbs."""
 _CLIMB_GAIN, _MAX_CLIMB_M_S = 1.2, 1.0
 _STILL_M_S = 0.2
+_SENSIBLE = 1e6
+"""Odometry with a larger number, m or m/s, or with NaN, is ignored."""
 
 
 class TeamLink(SavedAttributes):
@@ -43,7 +45,9 @@ class TeamLink(SavedAttributes):
 
     def _listener(self, row: int) -> Callable[[Any], None]:
         def on_odometry(message: Any) -> None:
-            self._samples[row] = OdometrySample.from_odometry(message)
+            sample = OdometrySample.from_odometry(message)
+            if np.abs([*sample.position, *sample.velocity, *sample.attitude]).max() < _SENSIBLE:
+                self._samples[row] = sample
 
         return on_odometry
 

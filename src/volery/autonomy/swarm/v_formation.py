@@ -234,7 +234,7 @@ class VFormation(SavedAttributes, Node):
         flock: Array = np.concatenate((position.T, velocity.T)) / self._span
         return flock
 
-    def _search_anew(self, now_ns: int, reason: str) -> None:
+    def _restart_search(self, now_ns: int, reason: str) -> None:
         """Searches from the flight, which has changed."""
         self._num_kicks, self._lead = 0, 1
         self._begin_search(now_ns, reason)
@@ -306,7 +306,7 @@ class VFormation(SavedAttributes, Node):
             return
         self._lost_steps += 1
         if self._lost_steps > 2:
-            self._search_anew(now_ns, f"the formation is lost: cost {cost:.2g}")
+            self._restart_search(now_ns, f"the formation is lost: cost {cost:.2g}")
 
     def _drop_lost(self, now_ns: int) -> None:
         """Removes lost UAVs from the team; takes over the positions of displaced ones."""
@@ -319,7 +319,7 @@ class VFormation(SavedAttributes, Node):
         displaced = offset > _DISPLACED * self._span
         self._bird[rows[displaced]] = position[displaced]
         if lost or displaced.any():
-            self._search_anew(now_ns, f"{lost} left" if lost else "a UAV was displaced")
+            self._restart_search(now_ns, f"{lost} left" if lost else "a UAV was displaced")
 
     def _steer(self) -> None:
         """Commands the members towards their birds."""

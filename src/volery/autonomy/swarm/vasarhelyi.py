@@ -13,7 +13,7 @@ import numpy as np
 
 from volery.autonomy.swarm.behaviour import Flock, Surroundings
 from volery.core.arrays import Array
-from volery.core.compiled import inline_kernel, inner_kernel, kernel
+from volery.core.compiled import inner_kernel, kernel
 
 
 class VasarhelyiSettings(NamedTuple):
@@ -144,7 +144,7 @@ def _keep_off(
         wanted[i, 1] += (difference - allowed) / difference * y
 
 
-@inline_kernel
+@inner_kernel
 def _braking_speed(distance: float, slope: float, acceleration: float) -> float:
     """Returns the speed from which a vehicle stops within a distance (the paper's D)."""
     if distance <= 0.0:

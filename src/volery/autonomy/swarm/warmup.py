@@ -8,6 +8,7 @@ from volery.autonomy.swarm.ares import AresSearch, AresSettings
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import formation_fitness
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
+from volery.autonomy.swarm.particle_swarm import approach_margin
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 
 
@@ -18,6 +19,8 @@ def formation_search() -> None:
     formation_fitness(positions, velocities)
     search = AresSearch(positions, velocities, settings=AresSettings(num_clones=1))
     search.advance()
+    flock = np.zeros((4, 3))
+    approach_margin(flock, flock, 1.0)
 
 
 def flocking() -> None:
