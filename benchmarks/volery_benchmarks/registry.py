@@ -348,6 +348,7 @@ BENCHES: dict[str, Bench] = {
                 "recovery_s_one_lost": Bound(20.0, at_most=True),
                 "recovery_success_one_lost": Bound(0.95),
             },
+            in_all=False,  # it takes more than ten minutes
             has_quick=True,
         ),
         Bench(

@@ -3,7 +3,7 @@
 numba names the subfolders of its cache by a hash of the folder that a module lies in: each virtual
 environment, checkout and container would compile equal sources anew. And before it loads a
 function, it imports the implementations of all types and functions that any kernel can use, which
-takes a third of a start of Volery and serves only a compilation.
+takes a fifth of a start of Volery and serves only a compilation.
 """
 
 from __future__ import annotations

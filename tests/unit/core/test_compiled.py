@@ -206,7 +206,7 @@ def test_a_part_from_the_cache_links_into_another_kernel(tmp_path):
 
 
 def test_a_kernel_from_the_cache_needs_no_compiler(tmp_path):
-    """The implementations that only a compilation needs would take a third of a start."""
+    """The implementations that only a compilation needs would take a fifth of a start."""
     env = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path)}
     lines = [
         subprocess.run(

@@ -20,7 +20,7 @@ from volery.core.rng import stream_key, uniform
 
 
 class AresSettings(NamedTuple):
-    """Effort of the search. The defaults solve all of 1,000 random starts of 7 (`bench swarm`)."""
+    """Effort of the search; the defaults are for about seven birds (docs/swarms.md)."""
 
     num_clones: int = 30
     num_levels: int = 20

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import pkgutil
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from volery.autonomy.swarm.behaviour import (
     flock_within,
 )
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
-from volery.autonomy.swarm.team_link import TeamLink
+from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 from volery.core.arrays import Array
 from volery.core.errors import PlanError
@@ -28,18 +27,18 @@ _PERIOD_S = 0.05
 _STATUS_PERIODS = 20
 _APPROACH = 0.8
 """Speed per distance from a goal, 1/s."""
-BEHAVIOURS: dict[str, type[Any]] = {"vasarhelyi": Vasarhelyi, "olfati_saber": OlfatiSaber}
 
 
 class FlockNode(SavedAttributes, Node):
     """Flies the team `uavs` by a behaviour. Publishes `~/status` (JSON) each second.
 
-    UAVs that do not start with a take-off are waited for.
+    UAVs that do not start with a take-off are waited for. A behaviour of your own flies in a
+    subclass, whose `BEHAVIOURS` name it: what a scenario may run is decided by its nodes.
 
     Parameters
     ----------
     uavs: names of the team.
-    behaviour: `vasarhelyi`, `olfati_saber`, or `module:Class` of a `SwarmBehaviour`.
+    behaviour: one of `BEHAVIOURS`; by default the first.
     odometry: topic of the odometry, below a UAV's namespace; its frame must be fixed to the map.
     height_m: height of the flight, m in the map.
     speed_m_s: speed towards waypoints and goals.
@@ -51,6 +50,12 @@ class FlockNode(SavedAttributes, Node):
 
     """
 
+    BEHAVIOURS: ClassVar[dict[str, type[Any]]] = {
+        "vasarhelyi": Vasarhelyi,
+        "olfati_saber": OlfatiSaber,
+    }
+    """Implementations of `SwarmBehaviour` by the names of the parameter `behaviour`."""
+
     STATE = ("_goals", "_next", "_last_status", "_ticks")
     PARTS = ("_team",)
     WARMUP_TASKS = ("volery.autonomy.swarm.warmup:flocking",)
@@ -58,13 +63,15 @@ class FlockNode(SavedAttributes, Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("flock", **options)
         names = self.declare_parameter("uavs", ["uav1", "uav2", "uav3"]).value
-        self._behaviour = _behaviour(str(self.declare_parameter("behaviour", "vasarhelyi").value))
+        self._behaviour = self._named_behaviour()
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._height = self._number("height_m", 5.0, 0.5, 1000.0)
-        self._speed = self._number("speed_m_s", 3.0, 0.0, 100.0)
+        self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
+        self._speed = number(self, "speed_m_s", 3.0, 0.0, 100.0)
         self._waypoints = self._rows("waypoints_m", [[0.0, 0.0]], 2)
+        if not len(self._waypoints):
+            raise PlanError("waypoints_m is empty")
         self._swaps = bool(self.declare_parameter("swaps", False).value)
-        self._arrival = self._number("arrival_m", 3.0, 0.1, 1000.0)
+        self._arrival = number(self, "arrival_m", 3.0, 0.1, 1000.0)
         arena = self.declare_parameter("arena_m", []).value or NO_ARENA
         if len(arena) != len(NO_ARENA):
             raise PlanError("arena_m is [x_min, y_min, x_max, y_max]")
@@ -79,9 +86,13 @@ class FlockNode(SavedAttributes, Node):
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         self.create_timer(_PERIOD_S, self._on_timer)
 
-    def _number(self, name: str, default: float, least: float, most: float) -> float:
-        parameter = self.declare_parameter(name, default, min_value=least, max_value=most)
-        return float(parameter.value)
+    def _named_behaviour(self) -> SwarmBehaviour:
+        known = self.BEHAVIOURS
+        name = self.declare_parameter("behaviour", next(iter(known))).value
+        if name not in known:
+            raise PlanError(f"no swarm behaviour '{name}'; there are {', '.join(known)}")
+        behaviour: SwarmBehaviour = known[name]()
+        return behaviour
 
     def _rows(self, name: str, default: list[list[float]], width: int) -> Array:
         """Returns a parameter of rows of numbers (M, width). Raises `PlanError` for others."""
@@ -146,16 +157,3 @@ class FlockNode(SavedAttributes, Node):
             "least_distance_m": round(float(apart.min()), 3) if len(apart) > 1 else None,
         }
         self._last_status = publish_status(self._status, status, self._last_status)
-
-
-def _behaviour(name: str) -> SwarmBehaviour:
-    """Returns a behaviour by name. Raises `PlanError` if there is none."""
-    try:
-        kind = BEHAVIOURS.get(name) or pkgutil.resolve_name(name)
-        behaviour: SwarmBehaviour = kind()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
-        known = ", ".join(BEHAVIOURS)
-        raise PlanError(
-            f"no swarm behaviour '{name}' ({error}); {known}, or module:Class"
-        ) from None
-    return behaviour

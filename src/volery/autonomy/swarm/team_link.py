@@ -11,6 +11,7 @@ import numpy as np
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.core.errors import PlanError
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import Odometry, Twist, Vector3
 from volery.graph.nodes.node import Node
@@ -25,16 +26,25 @@ _SENSIBLE = 1e6
 """Odometry with a larger number, m or m/s, or with NaN, is ignored."""
 
 
+def number(node: Node, name: str, default: float, least: float, most: float) -> float:
+    """Declares a parameter that is a number within limits; returns its value."""
+    parameter = node.declare_parameter(name, default, min_value=least, max_value=most)
+    return float(parameter.value)
+
+
 class TeamLink(SavedAttributes):
     """Connects a node with N UAVs; a part of its state.
 
     odometry: name of the topic below the UAVs' namespaces; height_m: of the flight, in the map.
+    Raises `PlanError` for names that are none or not unique.
     """
 
     STATE = ("_samples", "members")
 
     def __init__(self, node: Node, names: Sequence[str], odometry: str, height_m: float) -> None:
         self.names = tuple(names)
+        if not names or len(set(names)) < len(names):
+            raise PlanError("uavs must name at least one UAV, each once")
         self.members = list(range(len(self.names)))
         """Rows of the UAVs that are not lost."""
         self._low_m = _LOW * height_m

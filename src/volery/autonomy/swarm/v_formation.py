@@ -16,7 +16,7 @@ from volery.autonomy.status import publish_status
 from volery.autonomy.swarm.ares import AresPlan, AresSearch, AresSettings
 from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
-from volery.autonomy.swarm.team_link import TeamLink
+from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
@@ -100,17 +100,17 @@ class VFormation(SavedAttributes, Node):
         super().__init__("v_formation", **options)
         names = self.declare_parameter("uavs", [f"uav{k + 1}" for k in range(_SEVEN)]).value
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._span = self._number("wing_span_m", 3.0, 0.1, 100.0)
-        self._duration_s = self._number("step_s", 2.0, 0.1, 100.0)
-        self._height = self._number("height_m", 5.0, 0.5, 1000.0)
-        self._height_step = self._number("height_step_m", 0.0, 0.0, 100.0)
-        distance = self._number("min_distance", 1.0, 0.0, 1.5)
+        self._span = number(self, "wing_span_m", 3.0, 0.1, 100.0)
+        self._duration_s = number(self, "step_s", 2.0, 0.1, 100.0)
+        self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
+        self._height_step = number(self, "height_step_m", 0.0, 0.0, 100.0)
+        distance = number(self, "min_distance", 1.0, 0.0, 1.5)
         self._slices = int(self.declare_parameter("slices", 10, min_value=1, max_value=1000).value)
-        self._lost_cost = self._number("lost_cost", 0.1, 1e-3, 1e3)
+        self._lost_cost = number(self, "lost_cost", 0.1, 1e-3, 1e3)
         self._seed = int(self.declare_parameter("seed", 1, min_value=0).value)
         self._gathers = bool(self.declare_parameter("gathers", True).value)
-        self._max_speed = max_speed = self._number("max_speed_m_s", 4.0, 0.1, 100.0)
-        acceleration = self._number("max_acceleration_m_s2", 1.0, 0.01, 100.0)
+        self._max_speed = max_speed = number(self, "max_speed_m_s", 4.0, 0.1, 100.0)
+        acceleration = number(self, "max_acceleration_m_s2", 1.0, 0.01, 100.0)
         limits = FlockLimits(
             distance,
             max_speed * self._duration_s / self._span,
@@ -141,10 +141,6 @@ class VFormation(SavedAttributes, Node):
         self._team = TeamLink(self, names, odometry, self._height)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def _number(self, name: str, default: float, least: float, most: float) -> float:
-        parameter = self.declare_parameter(name, default, min_value=least, max_value=most)
-        return float(parameter.value)
 
     # ------------------------------------------------------------------------------- behaviour
 

@@ -5,7 +5,7 @@ import pytest
 
 from volery.autonomy.swarm.ares import AresSettings, plan_formation
 from volery.autonomy.swarm.formation_fitness import formation_fitness
-from volery.autonomy.swarm.particle_swarm import FlockLimits
+from volery.autonomy.swarm.particle_swarm import FlockLimits, best_accelerations
 from volery.core.errors import PlanError
 
 
@@ -63,6 +63,13 @@ def test_birds_keep_their_limits():
     assert np.linalg.norm(plan.velocities, axis=2).max() <= 1.0 + 1e-9
     assert np.linalg.norm(np.diff(plan.velocities, axis=0), axis=2).max() <= 0.2 + 1e-9
     assert plan.is_solved
+
+
+def test_birds_that_cannot_keep_apart_have_no_plan():
+    head_on = np.array([[0.0, 2.0], [0.0, 0.0], [1.0, -1.0], [0.0, 0.0]])
+    limits = FlockLimits(min_distance=0.5, max_acceleration=0.0)
+    cost, _ = best_accelerations(head_on, 1, 5, limits, np.uint64(1), 0, np.empty((2, 2)))
+    assert cost == np.inf
 
 
 def test_birds_that_start_too_near_part():

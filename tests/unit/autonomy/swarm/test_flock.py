@@ -1,12 +1,14 @@
 """The node that flies a team by a behaviour, with UAVs that follow commands at once."""
 
 import copy
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from swarm_team import SwarmTeam
 
 from volery.autonomy.swarm.flock import FlockNode
+from volery.core.errors import PlanError, VoleryError
 
 BEHAVIOURS = ("vasarhelyi", "olfati_saber")
 GRID = [[5.0 * x, 5.0 * y, 5.0] for x in range(3) for y in range(3)]
@@ -19,6 +21,10 @@ class Away:
 
     def velocities(self, flock, preferred, around):
         return np.tile([0.0, 1.0], (len(flock.position), 1))
+
+
+class FlockAway(FlockNode):
+    BEHAVIOURS: ClassVar = {"away": Away}
 
 
 def distances(position):
@@ -78,7 +84,7 @@ def test_the_team_flies_on_without_a_lost_uav():
 
 
 def test_a_behaviour_of_ones_own():
-    team = SwarmTeam(FlockNode, GRID, behaviour=f"{__name__}:Away")
+    team = SwarmTeam(FlockAway, GRID)
     before = team.positions.copy()
     team.fly(5.0)
     moved = team.positions - before
@@ -90,15 +96,21 @@ def test_a_behaviour_of_ones_own():
     ("parameters", "words"),
     [
         ({"behaviour": "murmuration"}, "no swarm behaviour 'murmuration'"),
-        ({"behaviour": "volery.autonomy.swarm.flock:Nothing"}, "no swarm behaviour"),
+        ({"behaviour": "os:abort"}, "no swarm behaviour"),  # a parameter names no code
+        ({"waypoints_m": []}, "waypoints_m is empty"),
         ({"waypoints_m": [[1.0, float("nan")]]}, "not finite"),
         ({"arena_m": [1.0, 2.0]}, "arena_m is"),
         ({"obstacles_m": [[1.0, 2.0]]}, "each entry has 3 numbers"),
     ],
 )
 def test_wrong_parameters_are_refused(parameters, words):
-    with pytest.raises(Exception, match=words):
+    with pytest.raises(VoleryError, match=words):
         SwarmTeam(FlockNode, GRID, **parameters)
+
+
+def test_a_team_has_members_each_once():
+    with pytest.raises(PlanError, match="at least one UAV, each once"):
+        SwarmTeam(FlockNode, [])
 
 
 def test_a_snapshot_continues_the_same_flight():

@@ -65,6 +65,16 @@ def test_an_empty_flock_and_one_alone():
         np.testing.assert_allclose(wanted, [[1.0, 0.0]])
 
 
+@pytest.mark.parametrize(("kind", "distance"), [(Vasarhelyi, 7.0), (OlfatiSaber, 5.0)])
+def test_a_uav_adopts_a_part_of_its_neighbours_velocity(kind, distance):
+    """At a distance at which nothing else acts."""
+    position = np.array([[0.0, 0.0], [0.0, distance]])
+    flock = flock_within(position, np.array([[0.0, 0.0], [3.0, 0.0]]), 20.0)
+    wanted = kind().velocities(flock, np.zeros((2, 2)), Surroundings())
+    assert 0.2 < wanted[0, 0] < 2.0
+    assert wanted[0, 1] == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("kind", BEHAVIOURS)
 def test_a_flock_flies_on_together(kind):
     start = block(4, 5, 5.0) + np.random.default_rng(2).uniform(-0.5, 0.5, (20, 2))
