@@ -23,9 +23,10 @@ _OFFSETS = {
 
 
 class PixelTable(NamedTuple):
-    """P packets of LANES rays: tiles of 4 x 4 pixels, or of 2 x 2 with four samples each.
+    """P packets of LANES rays, of tiles of 4 x 4 pixels, or of 2 x 2 with four samples each.
 
-    Samples of a pixel are neighbouring lanes. Lanes beyond the image's edge repeat one within.
+    A tile is a packet of 16 lanes, or two of 8. Samples of a pixel are neighbouring lanes. Lanes
+    beyond the image's edge repeat one within.
     """
 
     direction: NDArray[np.float32]
@@ -71,13 +72,14 @@ def make_table(
     ideal[blind] = 0.0
     rays = np.stack([np.ones(blind.shape), -ideal[..., 0], -ideal[..., 1]], axis=1)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    packets_of_tile = len(rays) // len(tile_y)
     middle = np.minimum(tile_y[:, 0] + (side - 1) / 2.0, height - 1)
     share = middle / max(height - 1, 1)
     return PixelTable(
         np.ascontiguousarray(rays, dtype=np.float32),
-        np.ascontiguousarray(np.repeat(pixel, samples, axis=1), dtype=np.int64),
+        np.repeat(pixel, samples, axis=1).reshape(-1, LANES).astype(np.int64),
         blind,
-        np.round(share * readout_ns).astype(np.int64),
+        np.repeat(np.round(share * readout_ns).astype(np.int64), packets_of_tile),
         _cones(rays, readout_ns),
         samples,
     )
