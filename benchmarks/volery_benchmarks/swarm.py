@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from volery.autonomy.swarm.ares import plan_formation
+from volery.autonomy.swarm.formation_search import plan_formation
 from volery.core.arrays import Array
 from volery.core.machine import usable_cores
 from volery_benchmarks.formation_flight import fly

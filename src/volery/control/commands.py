@@ -113,6 +113,11 @@ class FleetCommands:
         control_state["rotor_target"] = 0.0
         control_state["thrust"] = 0.0
 
+    def rotors_stopped(self, i: int) -> bool:
+        """Returns whether `stop_rotors` was the last command to UAV `i`."""
+        row = self._control_states[i]
+        return bool(row["level"] == ControlLevel.STOPPED and row["mode"] == FlightMode.LOW_LEVEL)
+
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Sets body rates (3,) rad/s, FLU, and `thrust` N along the z axis of UAV `i`."""
         self._refuse_plants(i, "rates", IdentifiedModel, Kinematic)

@@ -187,6 +187,25 @@ def test_a_stop_acts_with_the_very_next_physics_step(pair, way):
     assert ask(pair, "/uav1/kill").success  # its rotors stand still
 
 
+def test_a_killed_uav_falls_under_a_stream_of_twists_until_it_holds(pair):
+    uav = pair.uavs["uav2"]
+    session = pair.gateway.open("client")
+    session.advertise("/uav2/cmd_vel", "geometry_msgs/msg/Twist")
+    height = uav.position_map[2]
+    assert ask(pair, "/uav2/kill").success
+    for _ in range(10):
+        session.publish("/uav2/cmd_vel", twist(0.0))
+        pair.run(0.05)
+    assert uav.rotors_stopped
+    assert height - uav.position_map[2] > 0.8  # half a second of free fall, less drag
+    assert ask(pair, "/uav2/hold").success
+    session.publish("/uav2/cmd_vel", twist(0.0))
+    pair.run(0.05)
+    assert not uav.rotors_stopped
+    assert uav.mode.name == "VELOCITY"
+    session.close()
+
+
 def test_a_posted_twist_is_in_force_before_the_next_step(pair):
     session = pair.gateway.open("client")
     applied = []

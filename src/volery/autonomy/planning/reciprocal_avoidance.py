@@ -16,7 +16,9 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.vectors import norm
+from volery.core.compiled import inline_kernel
+
+_NOTHING = 1e-9
 
 
 class Neighbour(NamedTuple):
@@ -72,45 +74,46 @@ def half_planes(
         if abs(place[2] - position[2]) > separation.height_m:
             continue
         radius = separation.radius_m + age * separation.growth_m_s
-        planes.append(
-            _half_plane(
-                place[:2] - position[:2], velocity[:2], other.velocity[:2], radius, separation
-            )
+        x, y = (place[:2] - position[:2]).tolist()
+        vx, vy = (velocity[:2] - other.velocity[:2]).tolist()
+        nx, ny, change = half_plane(
+            x, y, vx, vy, radius, separation.horizon_s, separation.step_s
         )
+        normal = np.array([nx, ny])
+        planes.append(HalfPlane(velocity[:2] + 0.5 * change * normal, normal))
     return planes
 
 
-def _half_plane(
-    way: Array, own: Array, others: Array, radius: float, separation: Separation
-) -> HalfPlane:
-    """Computes a half plane by section 4 of the paper; `change` is its `u`."""
-    relative = own - others
-    square = float(way @ way)
-    too_near = square <= radius * radius
-    horizon = separation.step_s if too_near else separation.horizon_s
-    from_centre = relative - way / horizon
-    length = norm(from_centre)
-    ahead = float(from_centre @ way)
-    cut_off = ahead < 0.0 and ahead * ahead > radius * radius * length * length
-    if too_near or cut_off:  # nearest to the round end of the cone
-        if length > 1e-9:
-            normal = from_centre / length
-        elif square > 1e-18:
-            normal = -way / math.sqrt(square)
+@inline_kernel
+def half_plane(
+    x: float, y: float, vx: float, vy: float, radius: float, horizon_s: float, step_s: float
+) -> tuple[float, float, float]:
+    """Returns the direction (2) in which a relative velocity must change, and by how much (m/s).
+
+    By section 4 of the paper: x, y, m, is the way to the other vehicle and vx, vy, m/s, the
+    velocity relative to it. A negative change is one that is allowed.
+    """
+    square = x * x + y * y
+    is_near = square <= radius * radius
+    horizon = step_s if is_near else horizon_s
+    from_x, from_y = vx - x / horizon, vy - y / horizon
+    length = math.sqrt(from_x * from_x + from_y * from_y)
+    ahead = from_x * x + from_y * y
+    if is_near or (ahead < 0.0 and ahead * ahead > radius * radius * length * length):
+        # nearest to the round end of the cone
+        if length > _NOTHING:
+            nx, ny = from_x / length, from_y / length
+        elif square > _NOTHING * _NOTHING:
+            nx, ny = -x / math.sqrt(square), -y / math.sqrt(square)
         else:
-            normal = np.array([1.0, 0.0])
-        change = (radius / horizon - length) * normal
+            nx, ny = 1.0, 0.0
+        return nx, ny, radius / horizon - length
+    leg = math.sqrt(square - radius * radius)
+    if x * from_y - y * from_x > 0.0:  # nearest to the left leg
+        along_x, along_y = (x * leg - y * radius) / square, (x * radius + y * leg) / square
     else:
-        leg = math.sqrt(square - radius * radius)
-        left = float(way[0] * from_centre[1] - way[1] * from_centre[0]) > 0.0
-        if left:
-            along = np.array([way[0] * leg - way[1] * radius, way[0] * radius + way[1] * leg])
-        else:
-            along = -np.array([way[0] * leg + way[1] * radius, -way[0] * radius + way[1] * leg])
-        along = along / square
-        change = float(relative @ along) * along - relative
-        normal = np.array([-along[1], along[0]])
-    return HalfPlane(own + 0.5 * change, normal)
+        along_x, along_y = -(x * leg + y * radius) / square, (x * radius - y * leg) / square
+    return -along_y, along_x, vx * along_y - vy * along_x
 
 
 def violation(planes: Sequence[HalfPlane], velocities: Array) -> Array:

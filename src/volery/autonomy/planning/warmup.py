@@ -13,6 +13,7 @@ from volery.autonomy.planning.receding_horizon import (
     PlannerSettings,
     RecedingHorizonPlanner,
 )
+from volery.autonomy.planning.reciprocal_avoidance import half_plane
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.surface import Surface
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
@@ -45,4 +46,5 @@ def plans() -> None:
     planning = RecedingHorizonPlanner(PlannerSettings(MotionLimits(1.0, 1.0, 1.0, 1.0, 1.0)))
     at_rest = PrimitiveState(here, np.zeros(3), np.zeros(3))
     start = planning.start(at_rest, 0.0, 0, 0)
+    half_plane(1.0, 0.0, 1.0, 0.0, 1.0, 1.0, 1.0)
     planning.plan(start, np.ones(2), Observations(clearance, Surface(0.0, np.zeros(2)), []), 0)

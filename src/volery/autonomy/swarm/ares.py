@@ -49,26 +49,11 @@ class AresPlan(NamedTuple):
     """Whether the end is a V."""
 
 
-def plan_formation(
-    positions: ArrayLike,
-    velocities: ArrayLike,
-    seed: int = 0,
-    settings: AresSettings | None = None,
-) -> AresPlan:
-    """Returns a plan for a flock that starts at `positions` (N, 2) with `velocities` (N, 2).
-
-    The same arguments give the same plan. Raises `PlanError` as `formation_fitness` does.
-    """
-    search = AresSearch(positions, velocities, seed, settings)
-    while not search.is_done:
-        search.advance()
-    return search.plan()
-
-
 class AresSearch:
     """A search for a plan that advances in slices of a few milliseconds, while the flock flies.
 
-    Arguments and errors are those of `plan_formation`.
+    positions, velocities: (N, 2) of the flock, in wing spans and wing spans per step. The same
+    arguments give the same plan. Raises `PlanError` as `formation_fitness` does.
     """
 
     def __init__(

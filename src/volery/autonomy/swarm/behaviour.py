@@ -24,6 +24,8 @@ class Surroundings(NamedTuple):
     """(4,) x_min, y_min, x_max, y_max, m: walls around the swarm."""
     cylinders: Array = np.empty((0, 3))
     """(M, 3) x, y, radius, m: posts, trunks."""
+    echoes: Array = np.empty((0, 0, 2))
+    """(N, S, 2) m: what each UAV's own sensor sees, as offsets from it; NaN: nothing."""
 
 
 class Flock(NamedTuple):

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from volery.autonomy.perception.list_parameters import declare_points
 from volery.autonomy.status import publish_status
 from volery.autonomy.swarm.behaviour import (
     NO_ARENA,
@@ -15,6 +16,8 @@ from volery.autonomy.swarm.behaviour import (
     flock_within,
 )
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
+from volery.autonomy.swarm.orca import Orca
+from volery.autonomy.swarm.team_scans import TeamScans
 from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 from volery.core.arrays import Array
@@ -44,20 +47,24 @@ class FlockNode(SavedAttributes, Node):
     speed_m_s: speed towards waypoints and goals.
     waypoints_m: x, y of points to which the whole team flies in turn, m in the map.
     swaps: whether each UAV flies to the point opposite to its start, seen from the team's middle.
+    goals_m: x, y of a goal for each UAV, instead of waypoints.
     arrival_m: distance of the team's middle, or of a UAV, at which a waypoint counts as reached.
     arena_m: x_min, y_min, x_max, y_max of the walls; empty: there are none.
     obstacles_m: x, y, radius of obstacles.
+    scan: topic of a planar LIDAR, below a UAV's namespace, whose echoes are obstacles as well.
+    lidar_mount: x, y, z of that LIDAR in the body, m.
 
     """
 
     BEHAVIOURS: ClassVar[dict[str, type[Any]]] = {
         "vasarhelyi": Vasarhelyi,
         "olfati_saber": OlfatiSaber,
+        "orca": Orca,
     }
     """Implementations of `SwarmBehaviour` by the names of the parameter `behaviour`."""
 
     STATE = ("_goals", "_next", "_last_status", "_ticks")
-    PARTS = ("_team",)
+    PARTS = ("_team", "_scans")
     WARMUP_TASKS = ("volery.autonomy.swarm.warmup:flocking",)
 
     def __init__(self, **options: Any) -> None:
@@ -71,6 +78,10 @@ class FlockNode(SavedAttributes, Node):
         if not len(self._waypoints):
             raise PlanError("waypoints_m is empty")
         self._swaps = bool(self.declare_parameter("swaps", False).value)
+        own_goals = declare_points(self, "goals_m", [])
+        if own_goals and len(own_goals) != len(names):
+            raise PlanError("goals_m has one goal for each UAV")
+        self._own_goals = np.array(own_goals, float).reshape(-1, 2)
         self._arrival = number(self, "arrival_m", 3.0, 0.1, 1000.0)
         arena = self.declare_parameter("arena_m", []).value or NO_ARENA
         if len(arena) != len(NO_ARENA):
@@ -83,6 +94,8 @@ class FlockNode(SavedAttributes, Node):
         self._ticks = 0
         self._last_status = ""
         self._team = TeamLink(self, names, odometry, self._height)
+        scan = str(self.declare_parameter("scan", "").value)
+        self._scans = TeamScans(self, self._team, scan)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         self.create_timer(_PERIOD_S, self._on_timer)
 
@@ -113,7 +126,8 @@ class FlockNode(SavedAttributes, Node):
         position, velocity = team.motion()
         goals = self._goals_now(position)
         flock = flock_within(position, velocity, self._behaviour.radius_m)
-        wanted = self._behaviour.velocities(flock, self._preferred(goals - position), self._around)
+        around = self._around._replace(echoes=self._scans.echoes(team.members, position))
+        wanted = self._behaviour.velocities(flock, self._preferred(goals - position), around)
         for row, level in zip(team.members, wanted, strict=True):
             team.command(row, level, self._height)
         self._ticks += 1
@@ -121,13 +135,16 @@ class FlockNode(SavedAttributes, Node):
             self._publish_status(position, velocity, goals)
 
     def _first_goals(self) -> Array:
+        """Returns the goals (N, 2) of each UAV; they count where each has its own."""
+        if len(self._own_goals):
+            return self._own_goals
         position, _ = self._team.motion()
         opposite: Array = 2.0 * position.mean(axis=0) - position
         return opposite
 
     def _goals_now(self, position: Array) -> Array:
         """Returns the present goals (M, 2) of the members; common ones keep the team's shape."""
-        if self._swaps and self._goals is not None:
+        if (self._swaps or len(self._own_goals)) and self._goals is not None:
             own: Array = self._goals[self._team.members]
             return own
         middle = position.mean(axis=0)

@@ -72,6 +72,7 @@ def _find_velocities(
     preferred: Any,
     arena: Any,
     cylinders: Any,
+    echoes: Any,
     settings: OlfatiSaberSettings,
     wanted: Any,
 ) -> None:
@@ -96,14 +97,13 @@ def _find_velocities(
             ax, ay = ax + bx, ay + by
         for k in range(len(cylinders)):
             x, y = cylinders[k, 0] - px, cylinders[k, 1] - py
-            distance = max(math.hypot(x, y), 1e-6)
-            x, y = x / distance, y / distance
-            around = cylinders[k, 2] / distance
-            along = -y * vx + x * vy
-            ux, uy = -around * along * y - vx, around * along * x - vy
-            away = max(distance - cylinders[k, 2], 1e-3)
-            bx, by = _of_obstacle(away * x, away * y, ux, uy, settings)
+            bx, by = _of_cylinder(x, y, cylinders[k, 2], vx, vy, settings)
             ax, ay = ax + bx, ay + by
+        for k in range(echoes.shape[1]):
+            x, y = echoes[i, k, 0], echoes[i, k, 1]
+            if not math.isnan(x):
+                bx, by = _of_cylinder(x, y, 0.0, vx, vy, settings)
+                ax, ay = ax + bx, ay + by
         wx, wy = vx + settings.response_s * ax, vy + settings.response_s * ay
         part = min(1.0, settings.max_speed_m_s / max(math.hypot(wx, wy), 1e-9))
         wanted[i, 0], wanted[i, 1] = part * wx, part * wy
@@ -123,6 +123,19 @@ def _of_neighbour(
     force *= settings.lattice_gain / math.sqrt(1.0 + _EPSILON * square)
     match = settings.matching_gain * near
     return force * x + match * ux, force * y + match * uy
+
+
+@inner_kernel
+def _of_cylinder(
+    x: float, y: float, radius: float, vx: float, vy: float, settings: OlfatiSaberSettings
+) -> tuple[float, float]:
+    """Returns the acceleration by a cylinder with its middle at (x, y), at a velocity (vx, vy)."""
+    distance = max(math.hypot(x, y), 1e-6)
+    x, y = x / distance, y / distance
+    around, along = radius / distance, x * vy - y * vx
+    ux, uy = -around * along * y - vx, around * along * x - vy
+    away = max(distance - radius, 1e-3)
+    return _of_obstacle(away * x, away * y, ux, uy, settings)
 
 
 @inner_kernel

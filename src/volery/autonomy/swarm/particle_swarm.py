@@ -304,7 +304,15 @@ def approach_margin(before: Any, after: Any, min_distance: float) -> float:
 @inner_kernel
 def _margin(before: Any, after: Any, i: int, j: int, min_distance: float) -> float:
     px, py = before[0, i] - before[0, j], before[1, i] - before[1, j]
-    qx, qy = after[0, i] - after[0, j] - px, after[1, i] - after[1, j] - py
+    return margin_between(
+        px, py, after[0, i] - after[0, j], after[1, i] - after[1, j], min_distance
+    )
+
+
+@inner_kernel
+def margin_between(px: float, py: float, qx: float, qy: float, min_distance: float) -> float:
+    """Returns `approach_margin` of two birds whose offset changes from (px, py) to (qx, qy)."""
+    qx, qy = qx - px, qy - py
     square = qx * qx + qy * qy
     t = min(max(-(px * qx + py * qy) / square, 0.0), 1.0) if square > 0.0 else 0.0
     nearest = math.hypot(px + t * qx, py + t * qy)

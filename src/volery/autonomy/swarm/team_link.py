@@ -61,6 +61,10 @@ class TeamLink(SavedAttributes):
 
         return on_odometry
 
+    def sample(self, row: int) -> OdometrySample | None:
+        """Returns the last odometry of a UAV; None before the first."""
+        return self._samples[row]
+
     def is_up(self) -> bool:
         """Returns whether all UAVs are in the air and none climbs."""
         return all(

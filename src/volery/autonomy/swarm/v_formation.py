@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from volery.autonomy.status import publish_status
-from volery.autonomy.swarm.ares import AresPlan, AresSearch, AresSettings
+from volery.autonomy.swarm.ares import AresPlan, AresSettings
 from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
+from volery.autonomy.swarm.formation_search import FormationSearch
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
 from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.core.arrays import Array
@@ -34,11 +35,11 @@ _DISPLACED = 1.5
 _CROSSING_M = 0.5
 """Height difference of UAVs whose ways to the start positions cross."""
 _BOX = 3.0
-"""Side of the box of random starts of seven, in wing spans, after ARES; it grows with the area."""
+"""Side of the box of random starts of seven, in wing spans, after ARES; larger teams are as dense."""
 _SEVEN = 7
 _SPEEDS = (0.25, 0.75)
 """Random start velocities per axis, in wing spans per step, after ARES."""
-_MOST_DRAWS = 10_000
+_DRAWS, _MOST_DRAWS = 1_000, 50_000
 _MOST_LEAD = 8
 """Most steps that a search may last."""
 _MOST_KICKS = 10
@@ -80,7 +81,7 @@ class VFormation(SavedAttributes, Node):
     min_distance: distance that plans keep between birds, in wing spans.
     max_speed_m_s: speed that plans do not exceed.
     max_acceleration_m_s2: change of a bird's velocity that plans do not exceed, over its step.
-    slices: searches of a clone in each period of 50 ms.
+    slices: steps of the search in each period of 50 ms.
     lost_cost: cost of the formation above which a V is lost.
     seed: of starts and searches.
     gathers: whether the team first flies to random positions.
@@ -123,7 +124,7 @@ class VFormation(SavedAttributes, Node):
         """(N, 2) m, map: positions that the UAVs follow."""
         self._velocity = np.zeros((len(names), 2))
         """(N, 2) m/s, map: velocities of the birds."""
-        self._search: AresSearch | None = None
+        self._search: FormationSearch | None = None
         self._plan: AresPlan | None = None
         self._step = 0
         self._step_ns = 0
@@ -178,9 +179,11 @@ class VFormation(SavedAttributes, Node):
         """Returns random positions (N, 2), wing spans, sorted so that the ways hardly cross."""
         count = len(offsets)
         rng = np.random.default_rng(self._seed)
-        side = _BOX * math.sqrt(max(1.0, count / _SEVEN))
+        side = (_BOX + _APART) * math.sqrt(max(1.0, count / _SEVEN)) - _APART
         found: list[Array] = []
-        for _ in range(_MOST_DRAWS):
+        for draw in range(_MOST_DRAWS):
+            if draw % _DRAWS == 0:  # the first ones may leave no room
+                found = []
             drawn = rng.uniform(-0.5 * side, 0.5 * side, 2)
             if all(math.dist(drawn, other) >= _APART for other in found):
                 found.append(drawn)
@@ -218,7 +221,7 @@ class VFormation(SavedAttributes, Node):
         self._step_ns = now_ns + round(self._lead * self._duration_s * NS_PER_S)
         self._num_searches += 1
         flock = self._flock(self._lead)
-        self._search = AresSearch(
+        self._search = FormationSearch(
             flock[:2].T, flock[2:].T, self._seed + self._num_searches, self._settings
         )
         self._publish_status()
@@ -268,7 +271,7 @@ class VFormation(SavedAttributes, Node):
         rows, steps = self._team.members, max(1, self._lead)
         least = self._settings.limits.min_distance
         before, kept = self._flock(0), self._velocity[self._team.members].copy()
-        for _ in range(_MOST_DRAWS // 10):
+        for _ in range(_DRAWS):
             size = rng.uniform(0.0, 0.7, len(rows)) * np.linalg.norm(kept, axis=1)
             way = rng.uniform(-math.pi, math.pi, len(rows))
             self._velocity[rows] = kept + (size * np.array([np.cos(way), np.sin(way)])).T

@@ -70,6 +70,7 @@ def _add_terms(
     neighbour: Any,
     arena: Any,
     cylinders: Any,
+    echoes: Any,
     settings: VasarhelyiSettings,
     wanted: Any,
 ) -> None:
@@ -85,10 +86,11 @@ def _add_terms(
             _keep_off(velocity, i, away, settings.wall_speed_m_s, x, y, settings, wanted)
         for k in range(len(cylinders)):
             x, y = position[i, 0] - cylinders[k, 0], position[i, 1] - cylinders[k, 1]
-            distance = max(math.hypot(x, y), 1e-6)
-            away = distance - cylinders[k, 2]
-            x, y = x / distance, y / distance
-            _keep_off(velocity, i, away, settings.post_speed_m_s, x, y, settings, wanted)
+            _keep_off_post(velocity, i, x, y, cylinders[k, 2], settings, wanted)
+        for k in range(echoes.shape[1]):
+            x, y = -echoes[i, k, 0], -echoes[i, k, 1]
+            if not math.isnan(x):
+                _keep_off_post(velocity, i, x, y, 0.0, settings, wanted)
         speed = math.hypot(wanted[i, 0], wanted[i, 1])
         if speed > settings.max_speed_m_s:
             wanted[i, 0] *= settings.max_speed_m_s / speed
@@ -142,6 +144,22 @@ def _keep_off(
     if difference > allowed:
         wanted[i, 0] += (difference - allowed) / difference * x
         wanted[i, 1] += (difference - allowed) / difference * y
+
+
+@inner_kernel
+def _keep_off_post(
+    velocity: Any,
+    i: int,
+    x: float,
+    y: float,
+    radius: float,
+    settings: VasarhelyiSettings,
+    wanted: Any,
+) -> None:
+    """Aligns UAV i, which is at (x, y) from the middle of a post, with the post's side."""
+    distance = max(math.hypot(x, y), 1e-6)
+    away, speed = distance - radius, settings.post_speed_m_s
+    _keep_off(velocity, i, away, speed, x / distance, y / distance, settings, wanted)
 
 
 @inner_kernel

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from volery.autonomy.swarm.ares import AresSearch, AresSettings
+from volery.autonomy.swarm.ares import AresSettings
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import formation_fitness
+from volery.autonomy.swarm.formation_search import plan_formation
+from volery.autonomy.swarm.joining import way_into
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
-from volery.autonomy.swarm.particle_swarm import approach_margin
+from volery.autonomy.swarm.orca import Orca
+from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
+from volery.autonomy.swarm.team_scans import find_nearest
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 
 
@@ -17,8 +21,9 @@ def formation_search() -> None:
     positions = np.array([[0.0, 0.0], [2.0, 1.0], [4.0, 0.0]])
     velocities = np.full((3, 2), 0.5)
     formation_fitness(positions, velocities)
-    search = AresSearch(positions, velocities, settings=AresSettings(num_clones=1))
-    search.advance()
+    plan_formation(positions, velocities, settings=AresSettings(num_clones=1, num_levels=1))
+    start, others, way = np.ones(4), np.zeros((2, 2, 1)), np.empty((2, 4))
+    way_into(start, start[:2], start[:2], others, FlockLimits(), np.uint64(1), 0, way)
     flock = np.zeros((4, 3))
     approach_margin(flock, flock, 1.0)
 
@@ -26,7 +31,8 @@ def formation_search() -> None:
 def flocking() -> None:
     """Compiles the behaviours of flocks."""
     position, velocity = np.array([[0.0, 0.0], [2.0, 1.0]]), np.zeros((2, 2))
+    find_nearest(np.ones((1, 2)), position, 0, np.full((4, 2), np.nan))
     around = Surroundings(cylinders=np.array([[5.0, 5.0, 0.3]]))
-    for behaviour in (Vasarhelyi(), OlfatiSaber()):
+    for behaviour in (Vasarhelyi(), OlfatiSaber(), Orca()):
         flock = flock_within(position, velocity, behaviour.radius_m)
         behaviour.velocities(flock, velocity, around)

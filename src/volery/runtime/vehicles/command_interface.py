@@ -49,7 +49,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> Iterator
     and, for an externally moved kinematic UAV, `pose_command`: its pose from the next step on.
 
     A Twist is in the level heading frame, a pose and a trajectory in the map frame. The UAV
-    ignores all of them on the ground and during take-off, landing and return. An invalid message
+    ignores all of them on the ground, during take-off, landing and return, and with its rotors
+    stopped. An invalid message
     (nan, another frame) is discarded with a logged warning, once per topic. An external client
     learns of it, and of a goal or trajectory that is ignored (`Graph.refuse`). An accepted Twist is
     published on `cmd_vel/applied` with the simulated time from which it acts; clients measure
@@ -128,9 +129,10 @@ def _careful(
 
     def receive(published: Published) -> None:
         nonlocal told
-        if uav.mode in _BUSY:
+        if uav.mode in _BUSY or uav.rotors_stopped:
             if not streamed:
-                graph.refuse(topic, f"{uav.name} is in mode {uav.mode.name}, which no goal ends")
+                state = f"is in mode {uav.mode.name}" if uav.mode in _BUSY else "was killed"
+                graph.refuse(topic, f"{uav.name} {state}, which no goal ends")
             return
         try:
             take(published.message)

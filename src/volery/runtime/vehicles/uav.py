@@ -183,6 +183,11 @@ class Uav(Uncopied):
         """Whether the UAV has crashed; its rotors do not start again."""
         return bool(self._fleet.state.crashed[self._row])
 
+    @property
+    def rotors_stopped(self) -> bool:
+        """Whether `stop_rotors` was its last command."""
+        return self._fleet.rotors_stopped(self._row)
+
     # ------------------------------------------------------------------------------------- faults
 
     def set_rotor_health(self, rotor: int, factor: float) -> None:

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from volery.autonomy.swarm.ares import AresSettings, plan_formation
+from volery.autonomy.swarm.ares import AresSettings
 from volery.autonomy.swarm.formation_fitness import formation_fitness
+from volery.autonomy.swarm.formation_search import plan_formation
 from volery.autonomy.swarm.particle_swarm import FlockLimits, best_accelerations
 from volery.core.errors import PlanError
 

@@ -5,9 +5,10 @@ import pytest
 
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
+from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 
-BEHAVIOURS = (Vasarhelyi, OlfatiSaber)
+BEHAVIOURS = (Vasarhelyi, OlfatiSaber, Orca)
 PERIOD_S, LAG_S, SPEED_M_S = 0.05, 0.3, 3.0
 AHEAD = np.array([100.0, 0.0])
 
@@ -116,3 +117,14 @@ def test_walls_keep_a_flock_inside(kind):
     swarm.fly(40.0)
     assert (swarm.position > -10.0).all()
     assert (swarm.position < [40.0, 30.0]).all()
+
+
+@pytest.mark.parametrize("kind", BEHAVIOURS)
+def test_echoes_of_a_post_count_like_the_post(kind):
+    flock = flock_within(np.array([[2.0, 1.0]]), np.array([[2.5, 0.0]]), 5.0)
+    preferred, post = np.array([[3.0, 0.0]]), np.array([5.0, 1.3])
+    known = Surroundings(cylinders=np.array([[*post, 0.0]]))
+    seen = Surroundings(echoes=np.array([[[np.nan, np.nan], post - flock.position[0]]]))
+    wanted = kind().velocities(flock, preferred, seen)
+    np.testing.assert_allclose(wanted, kind().velocities(flock, preferred, known))
+    assert not np.allclose(wanted, preferred)

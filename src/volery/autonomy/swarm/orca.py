@@ -1,0 +1,212 @@
+"""Optimal reciprocal collision avoidance of a swarm: each UAV does half of every avoidance.
+
+J. van den Berg, S. Guy, M. Lin, D. Manocha, "Reciprocal n-body collision avoidance", ISRR 2009.
+Each neighbour allows a half plane of velocities; of those that all allow, a UAV chooses the one
+nearest to its preferred velocity (section 5.1). Where there is none, it gives way to all
+neighbours as equally as possible (section 5.3), but not to obstacles, which it approaches only as
+fast as it may brake.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from volery.autonomy.planning.reciprocal_avoidance import half_plane
+from volery.autonomy.swarm.behaviour import Flock, Surroundings
+from volery.core.arrays import Array
+from volery.core.compiled import inner_kernel, kernel
+
+_PARALLEL = 1e-9
+_FAR = 1e4
+"""Of the largest speed: the distance of a velocity that stands for a direction."""
+
+
+class OrcaSettings(NamedTuple):
+    """Parameters of the avoidance."""
+
+    distance_m: float = 2.0
+    """Least distance between the centres of two UAVs."""
+    horizon_s: float = 4.0
+    """Time ahead in which they keep it."""
+    step_s: float = 0.5
+    """Time in which UAVs that are nearer part."""
+    obstacle_m: float = 1.0
+    """Least distance of a UAV's centre from obstacles."""
+    braking_s: float = 1.2
+    """Time in which a UAV may reach that distance at its present speed."""
+    max_speed_m_s: float = 5.0
+
+
+class Orca:
+    """Avoids all others reciprocally; implements `SwarmBehaviour`."""
+
+    def __init__(self, settings: OrcaSettings | None = None) -> None:
+        self.settings = chosen = settings or OrcaSettings()
+        self.radius_m = chosen.distance_m + 2.0 * chosen.max_speed_m_s * chosen.horizon_s
+
+    def velocities(self, flock: Flock, preferred: Array, around: Surroundings) -> Array:
+        """Returns commanded velocities (N, 2) m/s."""
+        wanted = np.empty((len(flock.position), 2))
+        _choose_all(*flock, np.array(preferred, float), *around, self.settings, wanted)
+        return wanted
+
+
+@kernel
+def _choose_all(
+    position: Any,
+    velocity: Any,
+    first: Any,
+    neighbour: Any,
+    preferred: Any,
+    arena: Any,
+    cylinders: Any,
+    echoes: Any,
+    settings: OrcaSettings,
+    wanted: Any,
+) -> None:
+    """Fills the wanted velocities (N, 2)."""
+    count = len(position)
+    num_obstacles = 4 + len(cylinders) + echoes.shape[1]
+    most = num_obstacles
+    for i in range(count):
+        most = max(most, num_obstacles + first[i + 1] - first[i])
+    planes, relaxed = np.empty((most, 3)), np.empty((most, 3))
+    for i in range(count):
+        hard = _add_obstacles(planes, position, i, arena, cylinders, echoes, settings)
+        end = hard
+        for j in neighbour[first[i] : first[i + 1]]:
+            ux, uy = velocity[i, 0], velocity[i, 1]
+            nx, ny, change = half_plane(
+                position[j, 0] - position[i, 0],
+                position[j, 1] - position[i, 1],
+                ux - velocity[j, 0],
+                uy - velocity[j, 1],
+                settings.distance_m,
+                settings.horizon_s,
+                settings.step_s,
+            )
+            planes[end, 0], planes[end, 1] = nx, ny
+            planes[end, 2] = nx * ux + ny * uy + 0.5 * change
+            end += 1
+        wanted[i, 0], wanted[i, 1] = _choose(
+            planes, hard, end, preferred[i, 0], preferred[i, 1], settings.max_speed_m_s, relaxed
+        )
+
+
+@inner_kernel
+def _add_obstacles(
+    planes: Any,
+    position: Any,
+    i: int,
+    arena: Any,
+    cylinders: Any,
+    echoes: Any,
+    settings: OrcaSettings,
+) -> int:
+    """Fills half planes in which UAV i may approach obstacles; returns their number."""
+    found = 0
+    for side in range(4):
+        axis, inwards = side % 2, -1.0 if side >= 2 else 1.0
+        away = inwards * (position[i, axis] - arena[side])
+        if away < math.inf:
+            planes[found, axis], planes[found, 1 - axis] = inwards, 0.0
+            planes[found, 2] = -_closing_speed(away, settings)
+            found += 1
+    for k in range(len(cylinders)):
+        x, y = cylinders[k, 0] - position[i, 0], cylinders[k, 1] - position[i, 1]
+        found = _add_obstacle(planes, found, x, y, cylinders[k, 2], settings)
+    for k in range(echoes.shape[1]):
+        found = _add_obstacle(planes, found, echoes[i, k, 0], echoes[i, k, 1], 0.0, settings)
+    return found
+
+
+@inner_kernel
+def _add_obstacle(
+    planes: Any, found: int, x: float, y: float, radius: float, settings: OrcaSettings
+) -> int:
+    """Adds the half plane of a round obstacle at an offset, if there is one."""
+    distance = max(math.hypot(x, y), 1e-6)
+    speed = _closing_speed(distance - radius, settings)
+    if not speed < settings.max_speed_m_s:  # far, or no obstacle: nan
+        return found
+    planes[found, 0], planes[found, 1], planes[found, 2] = -x / distance, -y / distance, -speed
+    return found + 1
+
+
+@inner_kernel
+def _closing_speed(distance: float, settings: OrcaSettings) -> float:
+    """Returns how fast a UAV may approach an obstacle at a distance; negative: it must part."""
+    return (distance - settings.obstacle_m) / settings.braking_s
+
+
+@inner_kernel
+def _choose(
+    planes: Any, hard: int, end: int, vx: float, vy: float, limit: float, relaxed: Any
+) -> tuple[float, float]:
+    """Returns the velocity nearest to (vx, vy) that the half planes allow, or violates least.
+
+    planes: (K, 3) nx, ny, c: allowed are velocities with n . v >= c; the first `hard` always hold.
+    """
+    found, x, y = _nearest(planes, end, vx, vy, limit)
+    if found == end:
+        return x, y
+    if found < hard:  # within too many obstacles: as well as possible
+        hard = 0
+    violation = 0.0
+    for k in range(found, end):
+        nx, ny, c = planes[k, 0], planes[k, 1], planes[k, 2]
+        if c - (nx * x + ny * y) <= violation:
+            continue
+        for j in range(k):  # where none of these is violated more than plane k
+            if j < hard:
+                mx, my, d = planes[j, 0], planes[j, 1], planes[j, 2]
+            else:
+                mx, my, d = planes[j, 0] - nx, planes[j, 1] - ny, planes[j, 2] - c
+                size = math.hypot(mx, my)
+                mx, my, d = (
+                    (mx / size, my / size, d / size) if size > _PARALLEL else (1.0, 0.0, -math.inf)
+                )
+            relaxed[j, 0], relaxed[j, 1], relaxed[j, 2] = mx, my, d
+        best, bx, by = _nearest(relaxed, k, _FAR * limit * nx, _FAR * limit * ny, limit)
+        if best == k:
+            x, y = bx, by
+        violation = c - (nx * x + ny * y)
+    return x, y
+
+
+@inner_kernel
+def _nearest(
+    planes: Any, end: int, vx: float, vy: float, limit: float
+) -> tuple[int, float, float]:
+    """Returns the allowed velocity nearest to (vx, vy), of at most a speed `limit`.
+
+    The number is `end`, or that of the first half plane that cannot be kept with those before it.
+    """
+    part = min(1.0, limit / max(math.hypot(vx, vy), 1e-9))
+    x, y = part * vx, part * vy
+    for k in range(end):
+        nx, ny, c = planes[k, 0], planes[k, 1], planes[k, 2]
+        if nx * x + ny * y >= c:
+            continue
+        if abs(c) > limit:  # the border is out of reach
+            return k, x, y
+        reach = math.sqrt(limit * limit - c * c)
+        low, high = -reach, reach
+        for j in range(k):  # the border is c n + t (-ny, nx)
+            along = planes[j, 1] * nx - planes[j, 0] * ny
+            missing = planes[j, 2] - c * (planes[j, 0] * nx + planes[j, 1] * ny)
+            if abs(along) < _PARALLEL:
+                if missing > 0.0:
+                    return k, x, y
+            elif along > 0.0:
+                low = max(low, missing / along)
+            else:
+                high = min(high, missing / along)
+        if low > high:
+            return k, x, y
+        t = min(max(vy * nx - vx * ny, low), high)
+        x, y = c * nx - t * ny, c * ny + t * nx
+    return end, x, y
