@@ -52,7 +52,7 @@ class FormationSearch:
         self._settings = settings or AresSettings()
         self._seed, self._tries = seed, 0
         order = np.argsort(-(start[2:].sum(axis=1) @ start[:2]), kind="stable")
-        self._core = order[:_CORE].tolist()
+        self._core = sorted(order[:_CORE].tolist())
         self._num_rest = len(order) - len(self._core)
         self._begin_try()
         self.is_done = self.plan().is_solved

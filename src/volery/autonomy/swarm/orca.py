@@ -37,6 +37,9 @@ class OrcaSettings(NamedTuple):
     """Least distance of a UAV's centre from obstacles."""
     braking_s: float = 1.2
     """Time in which a UAV may reach that distance at its present speed."""
+    turn_rad: float = 0.35
+    """Turn to the right of a preferred velocity that a neighbour forbids; without it, UAVs that
+    meet symmetrically stop."""
     max_speed_m_s: float = 5.0
 
 
@@ -91,8 +94,12 @@ def _choose_all(
             planes[end, 0], planes[end, 1] = nx, ny
             planes[end, 2] = nx * ux + ny * uy + 0.5 * change
             end += 1
+        vx, vy = preferred[i, 0], preferred[i, 1]
+        if _is_forbidden(planes, hard, end, vx, vy):
+            c, s = math.cos(settings.turn_rad), math.sin(settings.turn_rad)
+            vx, vy = c * vx + s * vy, c * vy - s * vx
         wanted[i, 0], wanted[i, 1] = _choose(
-            planes, hard, end, preferred[i, 0], preferred[i, 1], settings.max_speed_m_s, relaxed
+            planes, hard, end, vx, vy, settings.max_speed_m_s, relaxed
         )
 
 
@@ -140,6 +147,14 @@ def _add_obstacle(
 def _closing_speed(distance: float, settings: OrcaSettings) -> float:
     """Returns how fast a UAV may approach an obstacle at a distance; negative: it must part."""
     return (distance - settings.obstacle_m) / settings.braking_s
+
+
+@inner_kernel
+def _is_forbidden(planes: Any, start: int, end: int, vx: float, vy: float) -> bool:
+    for k in range(start, end):
+        if planes[k, 0] * vx + planes[k, 1] * vy < planes[k, 2]:
+            return True
+    return False
 
 
 @inner_kernel

@@ -10,7 +10,7 @@ from volery.autonomy.planning.reciprocal_avoidance import half_plane
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.orca import Orca, OrcaSettings
 
-SETTINGS = OrcaSettings()
+SETTINGS = OrcaSettings(turn_rad=0.0)
 LIMIT = SETTINGS.max_speed_m_s
 number = st.floats(-12.0, 12.0)
 speed = st.floats(-3.0, 3.0)
@@ -38,7 +38,7 @@ def test_the_velocity_is_the_best_one(others, vx, vy):
     preferred = np.zeros_like(position)
     preferred[0] = vx, vy
     flock = flock_within(position, velocity, Orca().radius_m)
-    chosen = Orca().velocities(flock, preferred, Surroundings())[0]
+    chosen = Orca(SETTINGS).velocities(flock, preferred, Surroundings())[0]
     assert np.hypot(*chosen) <= LIMIT + 1e-9
     normals, offsets = [], []
     for (x, y), (ux, uy) in zip(position[1:], velocity[1:], strict=True):
