@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volery.cli.error_reporting import USER_ERROR, complain, complain_of
+from volery.cli.flight_failures import FAILED, failures_of
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
@@ -84,6 +85,8 @@ class RunOptions:
     """Workers among which the run is divided, besides the leader; None: it is not."""
     listen: str | None = None
     """Address at which workers of other machines join, `HOST[:PORT]`; None: they start here."""
+    fail_on: frozenset[str] = frozenset()
+    """Kinds of failures that the exit code reports; see `cli.flight_failures`."""
     drop_lost: bool = False
     """Whether the run continues without a lost worker's part; else this machine takes it over."""
     mavlink_key: Path | None = None
@@ -157,9 +160,12 @@ class CommandLineFlight:
             code, problem = USER_ERROR, "The log could not be written"
         report_written = self._write_report(problem)
         code = code if report_written else code or USER_ERROR
+        failures = [] if code else failures_of(self._simulation, self._options.fail_on)
+        for line in failures:
+            echo_line(f"failed: {line}", err=True)
         if not code and self._options.page is not None and not self._options.exit_at_end:
             self._stay()
-        return code
+        return FAILED if failures else code
 
     def _await_clients(self) -> None:
         """Waits for clients and applies `--start-paused` before the first step."""

@@ -43,6 +43,7 @@ def run(
     start_paused: run_options.StartPaused = False,
     wait_for: run_options.WaitFor = None,
     wait_timeout: run_options.WaitTimeout = DEFAULT_TIMEOUT_S,
+    fail_on: run_options.FailOn = None,
     threads: ThreadsOption = None,
     replay_commands: run_options.ReplayCommands = None,
     workers: run_options.Workers = None,
@@ -79,6 +80,7 @@ def run(
     Keys at a terminal: space pauses and resumes, . (or s) runs one physics step, + and - double
     and halve the real-time factor, m lifts it. Ctrl-C ends the run and writes log and report.
     """
+    from volery.cli.flight_failures import parse_failures
     from volery.cli.run import RunOptions, fly, parse_speed
 
     if middleware == "zenoh" and not ros2:
@@ -117,6 +119,7 @@ def run(
         start_paused=start_paused,
         wait_for=tuple(name for names in wait_for or () for name in names.split(",") if name),
         wait_timeout_s=wait_timeout,
+        fail_on=parse_failures(fail_on or ()),
         mavlink_key=mavlink_key,
         workers=workers,
         listen=listen,

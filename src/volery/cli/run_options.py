@@ -33,6 +33,13 @@ WaitFor = Annotated[
 WaitTimeout = Annotated[
     float, flight_option(min=0.1, help="Set the timeout of --wait-for, wall s.")
 ]
+FailOn = Annotated[
+    list[str] | None,
+    flight_option(
+        metavar="crash|contact[,..]",
+        help="Exit with 1 if a UAV has crashed at the end, or if one hit anything, repeatable.",
+    ),
+]
 ReplayCommands = Annotated[
     Path | None, flight_option(help="Replay the client commands of this log.")
 ]

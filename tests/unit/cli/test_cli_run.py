@@ -57,6 +57,19 @@ def test_run_writes_log_and_report(invoke: Invoke, tmp_path: Path) -> None:
     assert "LIDARs saw" in page
 
 
+def test_the_exit_code_reports_failures_that_are_asked_for(invoke: Invoke) -> None:
+    words = "run", "hover", "--seconds", 0.5, "--fail-on"
+    result = invoke(*words, "crash,contact")
+    assert result.exit_code == 1
+    assert "failed: first contact: 0.500 s  uav1 hit tree 7 at 2.50 m/s" in result.stderr
+    assert "crashed" not in result.stderr
+    assert "Flew 0.5 s" in result.stdout
+    assert invoke(*words, "crash").exit_code == 0  # a touch that it survived
+    refused = invoke(*words, "wreck")
+    assert refused.exit_code == 2
+    assert "--fail-on: crash or contact, not 'wreck'" in refused.stderr
+
+
 def test_options_reach_the_simulation(invoke: Invoke) -> None:
     result = invoke("run", "hover", "--seconds", 0.5, "--seed", 9, "--speed", 50, "--threads", 2)
     assert result.exit_code == 0, result.output

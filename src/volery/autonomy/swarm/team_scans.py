@@ -49,7 +49,7 @@ class TeamScans(SavedAttributes):
             if sample is not None:
                 points = self._projector.points(scan, sample)
                 is_level = np.abs(points[:, 2] - sample.position[2]) < _LEVEL_M
-                self._points[row] = points[is_level, :2]
+                self._points[row] = np.ascontiguousarray(points[is_level, :2])
 
         return on_scan
 

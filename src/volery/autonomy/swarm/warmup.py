@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from volery.autonomy.perception.scan_points import ScanProjector
+from volery.autonomy.perception.warmup import a_pose, a_scan
 from volery.autonomy.swarm.ares import AresSettings
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import formation_fitness
@@ -31,6 +33,7 @@ def formation_search() -> None:
 def flocking() -> None:
     """Compiles the behaviours of flocks."""
     position, velocity = np.array([[0.0, 0.0], [2.0, 1.0]]), np.zeros((2, 2))
+    ScanProjector([0.0, 0.0, 0.0]).points(a_scan(), a_pose(0))
     find_nearest(np.ones((1, 2)), position, 0, np.full((4, 2), np.nan))
     around = Surroundings(cylinders=np.array([[5.0, 5.0, 0.3]]))
     for behaviour in (Vasarhelyi(), OlfatiSaber(), Orca()):

@@ -5,12 +5,13 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from node_bench import scan
 from swarm_team import SwarmTeam
 
 from volery.autonomy.swarm.flock import FlockNode
 from volery.core.errors import PlanError, VoleryError
 
-BEHAVIOURS = ("vasarhelyi", "olfati_saber")
+BEHAVIOURS = ("vasarhelyi", "olfati_saber", "orca")
 GRID = [[5.0 * x, 5.0 * y, 5.0] for x in range(3) for y in range(3)]
 
 
@@ -75,6 +76,48 @@ def test_a_team_avoids_its_obstacles():
     assert team.positions[0, 0] > 38.0
 
 
+def scan_of(post, radius, position):
+    """Ranges (720,) of beams all around a UAV at `position` (2,) that sees a post."""
+    angles = np.linspace(-np.pi, np.pi, 720)
+    x, y = np.array(post) - position
+    along, aside = x * np.cos(angles) + y * np.sin(angles), y * np.cos(angles) - x * np.sin(angles)
+    inside = np.maximum(radius**2 - aside**2, 0.0)
+    is_hit = (along > 0.0) & (np.abs(aside) < radius)
+    return np.where(is_hit, along - np.sqrt(inside), np.inf)
+
+
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_a_team_avoids_what_its_lidars_see(behaviour):
+    post, radius, starts = (20.0, 0.2), 0.5, [[0.0, 0.0, 5.0], [0.0, 6.0, 5.0]]
+    goals = [[40.0, 1.0], [40.0, 7.0]]
+    team = SwarmTeam(
+        FlockNode, starts, behaviour=behaviour, goals_m=goals, scan="laser/horizontal/scan"
+    )
+    least = np.inf
+    for _ in range(500):
+        for row, name in enumerate(team.names):
+            ranges = scan_of(post, radius, team.positions[row, :2])
+            team.send(f"/{name}/laser/horizontal/scan", scan(team.now_ns, ranges))
+        team.fly(0.1)
+        least = min(least, np.hypot(*(team.positions[:, :2] - post).T).min())
+    assert least > radius + 0.4
+    np.testing.assert_allclose(team.positions[:, :2], goals, atol=1.5)
+
+
+def test_echoes_of_teammates_and_of_the_ground_are_no_obstacles():
+    team = SwarmTeam(FlockNode, [[0.0, 0.0, 5.0], [4.0, 0.0, 5.0]], scan="scan")
+    team.fly(0.1)
+    scans, members = team.node._scans, team.node._team.members
+    team.send("/uav1/scan", scan(team.now_ns, np.full(360, 4.0)))
+    team.fly(0.1)
+    echoes = scans.echoes(members, team.positions[:, :2])
+    assert np.isnan(echoes[1]).all()  # it has no scan
+    seen = echoes[0][~np.isnan(echoes[0, :, 0])]
+    np.testing.assert_allclose(np.hypot(*seen.T), 4.0, atol=0.05)
+    assert len(seen) == 33  # of 36 sectors; the other UAV fills those ahead
+    assert np.hypot(*(seen - [4.0, 0.0]).T).min() > 0.9
+
+
 def test_the_team_flies_on_without_a_lost_uav():
     team = SwarmTeam(FlockNode, GRID, waypoints_m=[[40.0, 5.0]])
     team.fly(3.0)
@@ -97,6 +140,7 @@ def test_a_behaviour_of_ones_own():
     [
         ({"behaviour": "murmuration"}, "no swarm behaviour 'murmuration'"),
         ({"behaviour": "os:abort"}, "no swarm behaviour"),  # a parameter names no code
+        ({"goals_m": [[0.0, 1.0]]}, "goals_m has one goal for each UAV"),
         ({"waypoints_m": []}, "waypoints_m is empty"),
         ({"waypoints_m": [[1.0, float("nan")]]}, "not finite"),
         ({"arena_m": [1.0, 2.0]}, "arena_m is"),

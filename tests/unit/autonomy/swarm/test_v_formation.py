@@ -54,6 +54,17 @@ def test_a_team_that_loses_a_uav_forms_a_v_of_the_others():
     assert team.status["upwash"] > 4.5
 
 
+def test_a_larger_team_joins_the_v_of_the_first_seven():
+    team = Team(count=15, slices=50)
+    team.fly_until(is_v)
+    assert team.status["upwash"] > 13.5
+    team.silent.add(2)
+    team.fly_until(lambda status: "uav3" not in status["members"])
+    team.fly_until(is_v)
+    assert len(team.status["members"]) == 14
+    assert team.status["upwash"] > 12.5
+
+
 def test_a_displaced_uav_returns_into_a_v():
     team = Team()
     team.fly_until(is_v)
