@@ -27,6 +27,12 @@ from volery.control.fleet_rows import (
     restarted_rows,
     shifted_rows,
 )
+from volery.control.divided_step import (
+    StepPart,
+    StepResult,
+    advance_in_parts,
+    is_worth_dividing,
+)
 from volery.control.fleet_variation import FleetParameters, FleetVariation
 from volery.control.flight_modes import FlightMode
 from volery.control.flying_start import FlyingStart, set_motion
@@ -50,6 +56,7 @@ from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.core.rows import Rows
+from volery.core.workers import Workers
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
@@ -188,17 +195,37 @@ class Fleet(FleetCommands):
         terrain: TerrainGrid,
         *,
         event_ends: bool = False,
+        workers: Workers | None = None,
     ) -> int:
         """Runs up to `steps` physics steps; returns the number done.
 
         The number is smaller when a UAV has used up its `contact_budget` or `separation_budget`,
-        or, with `event_ends`, after an event. `advance(0, ...)` compiles the step.
+        or, with `event_ends`, after an event. `advance(0, ...)` compiles the step. workers: threads
+        that share the UAVs of a large fleet; the results are those of one thread.
         """
         if terrain is not self._grid or self._ground is None:
             self._ground = self._ground_of(terrain)
         done = 0
         while True:
-            more, written, spent = advance_fleet(
+            part = StepPart(self.step, steps - done, 0, len(self), self._events)
+            if workers is None or not is_worth_dividing(workers, len(self)):
+                result = self._advance_part(part, event_ends)
+            else:
+                result = advance_in_parts(
+                    lambda own: self._advance_part(own, event_ends), part, self._periods, workers
+                )
+            self.step += result.steps
+            done += result.steps
+            if result.written:
+                self._drained += [event_of(row) for row in self._events[: result.written]]
+            if result.spent or done >= steps or (event_ends and result.written):
+                return done
+
+    def _advance_part(self, part: StepPart, event_ends: bool) -> StepResult:
+        """Advances some UAVs by some steps."""
+        assert self._ground is not None
+        return StepResult(
+            *advance_fleet(
                 self._uavs,
                 self._models,
                 self._jets,
@@ -209,20 +236,19 @@ class Fleet(FleetCommands):
                 None if self._all_rigid else self._references,
                 self._air,
                 self._air_nodes,
-                self._events,
-                self.step,
-                steps - done,
+                part.events,
+                part.step,
+                part.steps,
                 *self._periods,
                 self._dt,
                 self._bounce,
                 event_ends,
+                part.first,
+                part.last,
+                part.calm,
+                part.look,
             )
-            self.step += more
-            done += more
-            if written:
-                self._drained += [event_of(row) for row in self._events[:written]]
-            if spent or done >= steps or (event_ends and written):
-                return done
+        )
 
     @property
     def has_events(self) -> bool:

@@ -108,8 +108,12 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     dt: float,
     bounce: bool,
     event_ends: bool,
-) -> tuple[int, int, bool]:
-    """Advances all UAVs by up to `steps` steps of `dt` s, from step number `step`.
+    first: int,
+    last: int,
+    calm: bool,
+    look: bool,
+) -> tuple[int, int, bool, bool, bool]:
+    """Advances the UAVs first..last-1 by up to `steps` steps of `dt` s, from step number `step`.
 
     paths: segments of trajectories, see `control.trajectory_kernels`. references: None if all
     plants are rigid bodies: the other plants are then not compiled at all. Otherwise (N, L, 6),
@@ -120,19 +124,20 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     A UAV with a new stop command is guided in the first step, without waiting for a tick. The call
     ends early after a step in which a budget ran out, the event buffer grew full or, with
     `event_ends`, an event occurred. The air around the UAVs is updated every `air_steps`, a
-    multiple of `guidance_steps`. Returns the steps done, the events written, and whether a budget
-    ran out.
+    multiple of `guidance_steps`.
+
+    calm: whether nothing can happen to a UAV before the next guidance tick. look: whether a UAV may
+    have met another's jet since the last search, which is then repeated for all UAVs. At first, and
+    whenever it is not known: False, True. Returns the steps done, the events written, whether a
+    budget ran out, calm and look.
     """
     grid = TerrainGrid(heights, origin_x, origin_y, spacing)
     scratch = np.empty(SCRATCH_SHAPE)
-    count = uavs.shape[0]
     rows = history_position.shape[0]
     written = 0
     spent = False
-    calm = False  # whether nothing can happen before the next guidance tick
-    look = True  # whether a UAV may have met another's jet since the last search
     done = 0
-    room = events.shape[0] - EVENTS_A_STEP * count
+    room = events.shape[0] - EVENTS_A_STEP * (last - first)
     while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
         draining = step % (guidance_steps * BATTERY_TICKS) == 0
@@ -146,7 +151,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             look = False
         first_row, first_phase = (step + 1) % rows, step % attitude_steps
         calm = True
-        for i in range(count):
+        for i in range(first, last):
             row, phase = (
                 first_row,
                 first_phase,
@@ -247,7 +252,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             )
         step += together
         done += together
-    return done, written, spent
+    return done, written, spent, calm, look
 
 
 @inner_kernel

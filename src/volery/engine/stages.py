@@ -45,7 +45,9 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
     first, fleet = engine.fleet.step, engine.fleet
     last = engine.horizon(tick.last_step)
     while fleet.step < last:
-        fleet.advance(last - fleet.step, engine.terrain, event_ends=True)
+        fleet.advance(
+            last - fleet.step, engine.terrain, event_ends=True, workers=engine.scene.workers
+        )
         if not engine.fuses_ticks or fleet.has_events or not engine.collisions.refill():
             break
     if fleet.step > first:
