@@ -63,10 +63,10 @@ def crossing_streams(seed: int) -> Crowd:
     rng = np.random.default_rng(seed)
     block = 3.0 * np.stack(np.meshgrid(np.arange(5), np.arange(10)), axis=-1).reshape(-1, 2)
     block = block - block.mean(axis=0)
-    east = block + (-40.0, 0.0) + rng.uniform(-0.4, 0.4, block.shape)
-    north = block[:, ::-1] + (0.0, -40.0) + rng.uniform(-0.4, 0.4, block.shape)
+    east = block + np.array([-40.0, 0.0]) + rng.uniform(-0.4, 0.4, block.shape)
+    north = block[:, ::-1] + np.array([0.0, -40.0]) + rng.uniform(-0.4, 0.4, block.shape)
     start = np.vstack((east, north))
-    goal = np.vstack((east + (80.0, 0.0), north + (0.0, 80.0)))
+    goal = np.vstack((east + np.array([80.0, 0.0]), north + np.array([0.0, 80.0])))
     return Crowd(start, goal)
 
 
@@ -74,7 +74,7 @@ def forest_passage(seed: int) -> Crowd:
     """30 UAVs through 60 m of forest with 250 trees per hectare, by their LIDARs."""
     rng = np.random.default_rng(seed)
     rows = 4.0 * np.stack(np.meshgrid(np.arange(3), np.arange(10)), axis=-1).reshape(-1, 2)
-    start = rows - (14.0, 18.0) + rng.uniform(-0.4, 0.4, rows.shape)
+    start = rows - np.array([14.0, 18.0]) + rng.uniform(-0.4, 0.4, rows.shape)
     forest = {
         "kind": "procedural",
         "seed": seed,
@@ -83,7 +83,7 @@ def forest_passage(seed: int) -> Crowd:
         "minimum_spacing_m": 3.5,
         "species": {"longleaf_pine": 1.0},
     }
-    return Crowd(start, start + (85.0, 0.0), 2.0, forest)
+    return Crowd(start, start + np.array([85.0, 0.0]), 2.0, forest)
 
 
 SITUATIONS: dict[str, Callable[[int], Crowd]] = {

@@ -1,4 +1,4 @@
-"""Games between the search for a V and an attacker, after A. Lukina et al., "Attacking the V" (2017).
+"""Games of the search for a V against an attacker, after A. Lukina et al., "Attacking the V", 2017.
 
 A removal game: the attacker removes birds of a V once. A displacement game: in each of 20 steps the
 attacker displaces every bird, at random or, as a planner, by the worst of some random

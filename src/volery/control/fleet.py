@@ -16,6 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control import impulses
 from volery.control.commands import FleetCommands
+from volery.control.divided_step import (
+    StepPart,
+    StepResult,
+    advance_in_parts,
+    is_worth_dividing,
+)
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.fleet_rows import (
@@ -26,12 +32,6 @@ from volery.control.fleet_rows import (
     one_each,
     restarted_rows,
     shifted_rows,
-)
-from volery.control.divided_step import (
-    StepPart,
-    StepResult,
-    advance_in_parts,
-    is_worth_dividing,
 )
 from volery.control.fleet_variation import FleetParameters, FleetVariation
 from volery.control.flight_modes import FlightMode

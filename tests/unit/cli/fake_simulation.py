@@ -51,7 +51,9 @@ class FakeSimulation:
         self.graph = Graph(lambda: self.time_ns)
         self.gateway = None
         self.commands = SimpleNamespace(end=lambda: None)
-        self.uavs = {f"uav{k + 1}": SimpleNamespace(crashed=False) for k in range(scenario.uav_count)}
+        self.uavs = {
+            f"uav{k + 1}": SimpleNamespace(crashed=False) for k in range(scenario.uav_count)
+        }
         self.clock = SimpleNamespace(
             paused=False, paused_s=0.0, speed=None, quitting=False, quit=lambda: None
         )

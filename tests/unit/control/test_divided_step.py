@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from flights import FLAT
 
 from volery.control import divided_step

@@ -76,9 +76,7 @@ def half_planes(
         radius = separation.radius_m + age * separation.growth_m_s
         x, y = (place[:2] - position[:2]).tolist()
         vx, vy = (velocity[:2] - other.velocity[:2]).tolist()
-        nx, ny, change = half_plane(
-            x, y, vx, vy, radius, separation.horizon_s, separation.step_s
-        )
+        nx, ny, change = half_plane(x, y, vx, vy, radius, separation.horizon_s, separation.step_s)
         normal = np.array([nx, ny])
         planes.append(HalfPlane(velocity[:2] + 0.5 * change * normal, normal))
     return planes

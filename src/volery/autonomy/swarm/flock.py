@@ -17,8 +17,8 @@ from volery.autonomy.swarm.behaviour import (
 )
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
-from volery.autonomy.swarm.team_scans import TeamScans
 from volery.autonomy.swarm.team_link import TeamLink, number
+from volery.autonomy.swarm.team_scans import TeamScans
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 from volery.core.arrays import Array
 from volery.core.errors import PlanError

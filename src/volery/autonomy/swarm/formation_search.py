@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from volery.autonomy.swarm.ares import AresPlan, AresSearch, AresSettings
 from volery.autonomy.swarm.formation_fitness import fitness_cost, flock_of
 from volery.autonomy.swarm.joining import Joining
-from volery.core.arrays import Array
 from volery.core.rng import stream_key
 
 _CORE = 7
@@ -74,9 +73,7 @@ class FormationSearch:
             ways = self._start[None]
         cost = float(fitness_cost(np.ascontiguousarray(ways[-1])))
         steps = ways.transpose(0, 2, 1)
-        return AresPlan(
-            steps[:, :, :2], steps[:, :, 2:], cost, cost <= self._settings.solved_cost
-        )
+        return AresPlan(steps[:, :, :2], steps[:, :, 2:], cost, cost <= self._settings.solved_cost)
 
     def advance(self) -> None:
         """Searches for one clone of the seven, or for one of the others; nothing after the end."""

@@ -302,7 +302,10 @@ def _is_too_near(way: Any, others: Any, step: int, min_distance: float) -> bool:
     if min_distance <= 0.0:
         return False
     for j in range(others.shape[2]):
-        px, py = way[step - 1, 0] - others[step - 1, 0, j], way[step - 1, 1] - others[step - 1, 1, j]
+        px, py = (
+            way[step - 1, 0] - others[step - 1, 0, j],
+            way[step - 1, 1] - others[step - 1, 1, j],
+        )
         qx, qy = way[step, 0] - others[step, 0, j], way[step, 1] - others[step, 1, j]
         if margin_between(px, py, qx, qy, min_distance) < 0.0:
             return True

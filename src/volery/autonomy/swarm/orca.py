@@ -95,7 +95,10 @@ def _choose_all(
             planes[end, 2] = nx * ux + ny * uy + 0.5 * change
             end += 1
         vx, vy = preferred[i, 0], preferred[i, 1]
-        if _is_forbidden(planes, hard, end, vx, vy):
+        is_forbidden = False
+        for k in range(hard, end):
+            is_forbidden |= planes[k, 0] * vx + planes[k, 1] * vy < planes[k, 2]
+        if is_forbidden:
             c, s = math.cos(settings.turn_rad), math.sin(settings.turn_rad)
             vx, vy = c * vx + s * vy, c * vy - s * vx
         wanted[i, 0], wanted[i, 1] = _choose(
@@ -150,14 +153,6 @@ def _closing_speed(distance: float, settings: OrcaSettings) -> float:
 
 
 @inner_kernel
-def _is_forbidden(planes: Any, start: int, end: int, vx: float, vy: float) -> bool:
-    for k in range(start, end):
-        if planes[k, 0] * vx + planes[k, 1] * vy < planes[k, 2]:
-            return True
-    return False
-
-
-@inner_kernel
 def _choose(
     planes: Any, hard: int, end: int, vx: float, vy: float, limit: float, relaxed: Any
 ) -> tuple[float, float]:
@@ -193,9 +188,7 @@ def _choose(
 
 
 @inner_kernel
-def _nearest(
-    planes: Any, end: int, vx: float, vy: float, limit: float
-) -> tuple[int, float, float]:
+def _nearest(planes: Any, end: int, vx: float, vy: float, limit: float) -> tuple[int, float, float]:
     """Returns the allowed velocity nearest to (vx, vy), of at most a speed `limit`.
 
     The number is `end`, or that of the first half plane that cannot be kept with those before it.

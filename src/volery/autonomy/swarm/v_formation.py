@@ -35,7 +35,7 @@ _DISPLACED = 1.5
 _CROSSING_M = 0.5
 """Height difference of UAVs whose ways to the start positions cross."""
 _BOX = 3.0
-"""Side of the box of random starts of seven, in wing spans, after ARES; larger teams are as dense."""
+"""Side of the box of random starts of seven, wing spans, after ARES; larger teams are as dense."""
 _SEVEN = 7
 _SPEEDS = (0.25, 0.75)
 """Random start velocities per axis, in wing spans per step, after ARES."""
