@@ -94,29 +94,45 @@ class Collisions:
         if len(used_up):
             self._resolve_solids(used_up, time_ns)
         used_up = np.flatnonzero(state.separation_budget <= 0.0)
-        for i in used_up:
-            self._resolve_others(int(i), time_ns)
+        if not self._share_gaps(used_up):
+            for i in used_up:
+                self._resolve_others(int(i), time_ns)
         if self._actors is not None:
             self._actors.resolve(used_up, time_ns)
 
     def refill(self) -> bool:
-        """Queries around the UAVs whose contact budgets are used up; returns whether all are free.
+        """Queries around the UAVs whose budgets are used up; returns whether all are free.
 
-        If a UAV is in contact, or another budget is used up, nothing changes: call `resolve`.
+        Otherwise a UAV is in contact, or may be: call `resolve`, which goes on from here.
         """
-        state = self._fleet.state
-        if self._actors is not None or state.separation_budget.min() <= 0.0:
+        if self._actors is not None:
             return False
+        state = self._fleet.state
         rows = np.flatnonzero(state.contact_budget <= 0.0)
+        if len(rows):
+            found = self._query(rows)
+            gaps = found.distance - self._radius[rows]
+            if gaps.min() <= 0.0:
+                return False
+            self._touched_solid[rows[gaps > _RELEASE_M]] = -1
+            state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+        return self._share_gaps(np.flatnonzero(state.separation_budget <= 0.0))
+
+    def _share_gaps(self, rows: NDArray[np.int64]) -> bool:
+        """Does what `_resolve_others` does for each of `rows`, unless one is in contact.
+
+        Returns whether none is; nothing has changed otherwise.
+        """
         if not len(rows):
             return True
-        found = self._query(rows)
-        gaps = found.distance - self._radius[rows]
-        if gaps.min() <= 0.0:
-            return False
-        self._touched_solid[rows[gaps > _RELEASE_M]] = -1
-        state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
-        return True
+        return _share_gaps(
+            self._fleet.state.position_map,
+            self._radius,
+            rows,
+            self._uavs_per_env,
+            self._touching_uav,
+            self._fleet.state.separation_budget,
+        )
 
     def get_state(self) -> dict[str, Any]:
         """Returns the contacts, for a snapshot; the fleet saves the budgets."""
@@ -269,6 +285,41 @@ class Collisions:
 def _unit(vector: Array) -> Array:
     length = norm(vector)
     return vector / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+
+
+@brief_kernel
+def _share_gaps(
+    position: Any, radius: Any, rows: Any, uavs_per_env: int, touching: Any, budget: Any
+) -> bool:
+    """Shares the gaps of UAVs `rows` with the others of their environments.
+
+    Returns whether none of them is in contact; nothing changes otherwise. position: (N, 3) m;
+    radius: (N,) m; touching: (N, uavs_per_env) pairs in contact; budget: (N,) m.
+    """
+    for shares in (False, True):
+        for i in rows:
+            first = i - i % uavs_per_env
+            nearest = np.inf
+            for own in range(uavs_per_env):
+                j = first + own
+                if j == i:
+                    continue
+                x = position[i, 0] - position[j, 0]
+                y = position[i, 1] - position[j, 1]
+                z = position[i, 2] - position[j, 2]
+                gap = np.sqrt(x * x + y * y + z * z) - radius[j] - radius[i]
+                if not shares:
+                    if gap <= 0.0:
+                        return False
+                    continue
+                if gap > _RELEASE_M and touching[i, own]:
+                    touching[i, own] = touching[j, i - first] = False
+                half = max(0.5 * gap, 0.5 * _LEAST_BUDGET_M)
+                budget[j] = min(budget[j], half)
+                nearest = min(nearest, half)
+            if shares:
+                budget[i] = nearest
+    return True
 
 
 @brief_kernel

@@ -120,8 +120,8 @@ class Engine:
         self.sink = sink
         self.inbox = inbox or CommandQueue()
         self.fuses_ticks = fuses_ticks
-        """Whether a tick goes on after distance queries that find no contact: states are the same,
-        but `until` of a run is asked less often."""
+        """Whether a tick goes on after distance queries that find no contact, also with `until` of a
+        run, which is then asked less often; states are the same."""
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called repeatedly while waiting for a lock-step partner; returns whether the run
         continues."""
@@ -230,7 +230,7 @@ class Engine:
             if until is not None and until():
                 return
             before = self.fleet.step
-            self._run_tick(Tick(step))
+            self._run_tick(Tick(step, fuses=self.fuses_ticks or until is None))
             if in_pieces and (self.fleet.step < before or self.is_broken_off):
                 return
 

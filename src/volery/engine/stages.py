@@ -24,6 +24,8 @@ class Tick:
 
     last_step: int
     """Step at which the run ends; the tick ends earlier if something is due."""
+    fuses: bool = False
+    """Whether the tick goes on after distance queries that find no contact."""
 
 
 def take_commands(engine: Engine, tick: Tick) -> None:
@@ -48,7 +50,7 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
         fleet.advance(
             last - fleet.step, engine.terrain, event_ends=True, workers=engine.scene.workers
         )
-        if not engine.fuses_ticks or fleet.has_events or not engine.collisions.refill():
+        if not tick.fuses or fleet.has_events or not engine.collisions.refill():
             break
     if fleet.step > first:
         engine.turn = 0

@@ -52,7 +52,9 @@ def flown(steps, workers):
     events = []
     for _ in range(6):
         for i in range(7, COUNT, 3):
-            fleet.command_velocity_body(i, rng.uniform(-1.0, 1.0, 3))
+            velocity = rng.uniform(-1.0, 1.0, 3)
+            if not fleet.state.crashed[i]:
+                fleet.command_velocity_body(i, velocity)
         for i in range(7):
             if fleet.mode(i) is FlightMode.LANDED:
                 fleet.take_off(i, 0.5)

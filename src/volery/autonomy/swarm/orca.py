@@ -19,7 +19,8 @@ from volery.autonomy.swarm.behaviour import Flock, Surroundings
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-_PARALLEL = 1e-9
+_EQUAL = 1e-9
+"""Numbers that differ by less count as equal: borders of half planes coincide."""
 _FAR = 1e4
 """Of the largest speed: the distance of a velocity that stands for a direction."""
 
@@ -177,7 +178,7 @@ def _choose(
                 mx, my, d = planes[j, 0] - nx, planes[j, 1] - ny, planes[j, 2] - c
                 size = math.hypot(mx, my)
                 mx, my, d = (
-                    (mx / size, my / size, d / size) if size > _PARALLEL else (1.0, 0.0, -math.inf)
+                    (mx / size, my / size, d / size) if size > _EQUAL else (1.0, 0.0, -math.inf)
                 )
             relaxed[j, 0], relaxed[j, 1], relaxed[j, 2] = mx, my, d
         best, bx, by = _nearest(relaxed, k, _FAR * limit * nx, _FAR * limit * ny, limit)
@@ -197,7 +198,7 @@ def _nearest(planes: Any, end: int, vx: float, vy: float, limit: float) -> tuple
     x, y = part * vx, part * vy
     for k in range(end):
         nx, ny, c = planes[k, 0], planes[k, 1], planes[k, 2]
-        if nx * x + ny * y >= c:
+        if nx * x + ny * y >= c - _EQUAL:
             continue
         if abs(c) > limit:  # the border is out of reach
             return k, x, y
@@ -206,8 +207,8 @@ def _nearest(planes: Any, end: int, vx: float, vy: float, limit: float) -> tuple
         for j in range(k):  # the border is c n + t (-ny, nx)
             along = planes[j, 1] * nx - planes[j, 0] * ny
             missing = planes[j, 2] - c * (planes[j, 0] * nx + planes[j, 1] * ny)
-            if abs(along) < _PARALLEL:
-                if missing > 0.0:
+            if abs(along) < _EQUAL:
+                if missing > _EQUAL:
                     return k, x, y
             elif along > 0.0:
                 low = max(low, missing / along)

@@ -39,6 +39,9 @@ class FlightStates:
         self._engine = engine
         self._origin = origin
         self._publishers: dict[str, Publisher] = {}
+        self._wanted_list: list[tuple[int, Publisher]] = []
+        self._seen: tuple[int, tuple[str, ...]] | None = None
+        """Changes of the graph, and names of the UAVs, to which the list belongs."""
 
     def start(self, every: Callable[..., None]) -> None:
         """Publishes each `PERIOD_S` of simulated time from now on."""
@@ -60,8 +63,12 @@ class FlightStates:
 
     def _wanted(self) -> list[tuple[int, Publisher]]:
         """Returns the rows and publishers of UAVs whose topic has subscribers."""
-        told = [(k, self._publishers.get(name)) for k, name in enumerate(self._engine.names)]
-        return [(k, publisher) for k, publisher in told if publisher and publisher.subscriptions]
+        now = self._graph.changes, self._engine.names
+        if self._seen is None or now[0] != self._seen[0] or now[1] is not self._seen[1]:
+            self._seen = now
+            found = [(k, self._publishers.get(name)) for k, name in enumerate(now[1])]
+            self._wanted_list = [(k, own) for k, own in found if own and own.subscriptions]
+        return self._wanted_list
 
     def _publish(self) -> None:
         wanted = self._wanted()
