@@ -21,6 +21,8 @@ _PARTS_A_THREAD = 3
 """A thread whose core does other work as well takes fewer parts."""
 _WORTH = 2000
 """Steps of UAVs that take longer than to wake a thread."""
+_TICK = 3
+"""Steps that take as long as what a guidance tick adds to one."""
 
 
 class StepPart(NamedTuple):
@@ -76,7 +78,7 @@ def advance_in_parts(
         if step % air_steps == 0 and look:
             advance(StepPart(step, 1, 0, 0, whole.events, calm, look=True))
             look = False
-        if together * count < _WORTH:
+        if (together + _TICK * is_tick) * count < _WORTH:
             parts = [StepPart(step, together, 0, count, whole.events, calm, look=False)]
             results = [advance(parts[0])]
         else:

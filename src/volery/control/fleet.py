@@ -170,6 +170,12 @@ class Fleet(FleetCommands):
         return self._periods[2] * self._dt_ns
 
     @property
+    def s_to_next_tick(self) -> float:
+        """Time from a guidance tick to the next one, s; 0 between two ticks."""
+        is_tick = self.step % self._periods[0] == 0
+        return s_from_ns(self._periods[0] * self._dt_ns) if is_tick else 0.0
+
+    @property
     def common_period_ns(self) -> int:
         """Period after which control, air and batteries are updated together again, ns."""
         has_battery = any(airframe.battery is not None for airframe in self.airframes)

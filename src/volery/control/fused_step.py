@@ -17,6 +17,7 @@ from volery.control.setpoints import CONTROL_STATE
 from volery.core.arrays import Array
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
+from volery.core.compiled import brief_kernel
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.downwash import find_downwash
@@ -80,7 +81,7 @@ MODE_CHANGE = 3
 BATTERY_FELL = 4
 EVENTS_A_STEP = 4
 """Maximum number of events of one UAV in a step."""
-_REACH_M = 0.1
+_REACH_M = 0.03
 
 
 @fused_kernel
@@ -122,8 +123,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     each.
 
     A UAV with a new stop command is guided in the first step, without waiting for a tick. The call
-    ends early after a step in which a budget ran out, the event buffer grew full or, with
-    `event_ends`, an event occurred. The air around the UAVs is updated every `air_steps`, a
+    ends early after a step in which a budget ran out, at a guidance tick before which one may run
+    out, after which the event buffer is full or, with `event_ends`, an event occurred. The air around the UAVs is updated every `air_steps`, a
     multiple of `guidance_steps`.
 
     calm: whether nothing can happen to a UAV before the next guidance tick. look: whether a UAV may
@@ -150,7 +151,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             find_downwash(uavs, models, jets)
             look = False
         first_row, first_phase = (step + 1) % rows, step % attitude_steps
-        calm = True
+        calm, near = True, False
         for i in range(first, last):
             row, phase = (
                 first_row,
@@ -247,25 +248,27 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 phase = phase + 1 if phase + 1 < attitude_steps else 0
             spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
             look = look or body.in_jet or body.downwash_budget <= 0.0
-            calm = calm and (
-                body.asleep or (model.kind == RIGID_BODY and _is_far(body, guidance_steps * dt))
-            )
+            if not body.asleep:
+                way = reach_m(body.velocity_map, guidance_steps * dt)
+                to_others = min(body.contact_budget, body.separation_budget)
+                near = near or to_others <= way
+                calm = calm and model.kind == RIGID_BODY and min(to_others, body.ground_budget) > way
         step += together
         done += together
+        # A look at the gaps of those that are near may spare all others single steps.
+        spent = spent or (near and step % guidance_steps == 0)
     return done, written, spent, calm, look
 
 
-@inner_kernel
-def _is_far(body: Any, seconds: float) -> bool:
-    """Returns whether ground, solids and other UAVs are out of range for `seconds`.
+@brief_kernel
+def reach_m(velocity: Any, seconds: float) -> float:
+    """Returns a safe bound of a UAV's way in the time between two guidance ticks, m.
 
-    Twice the distance at the present speed plus `_REACH_M` is a safe bound: to exceed it in the 8
-    ms of a guidance tick a UAV would need 3,000 m/s^2.
+    velocity: (3,) m/s now. Twice the way at this speed plus `_REACH_M`: to exceed it in 8 ms a UAV
+    would need 940 m/s^2.
     """
-    vx, vy, vz = three(body.velocity_map)
-    way = 2.0 * (abs(vx) + abs(vy) + abs(vz)) * seconds + _REACH_M
-    nearest = min(body.ground_budget, body.contact_budget, body.separation_budget)
-    return bool(nearest > way)
+    vx, vy, vz = three(velocity)
+    return 2.0 * (abs(vx) + abs(vy) + abs(vz)) * seconds + _REACH_M
 
 
 @inner_kernel

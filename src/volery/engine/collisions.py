@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.control.fused_step import reach_m
 from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
@@ -86,29 +87,26 @@ class Collisions:
         return None if self._actors is None else self._actors.next_look_ns
 
     def resolve(self, time_ns: int) -> None:
-        """Queries around every UAV whose budget is used up; applies impulses, reports, refills."""
-        state = self._fleet.state
-        if self._actors is None and not _is_used_up(state.contact_budget, state.separation_budget):
-            return
-        used_up = np.flatnonzero(state.contact_budget <= 0.0)
-        if len(used_up):
-            self._resolve_solids(used_up, time_ns)
-        used_up = np.flatnonzero(state.separation_budget <= 0.0)
-        if not self._share_gaps(used_up):
-            for i in used_up:
+        """Queries around every UAV that is due; applies impulses, reports, refills budgets."""
+        due = self._due(self._fleet.state.contact_budget)
+        if len(due):
+            self._resolve_solids(due, time_ns)
+        due = self._due(self._fleet.state.separation_budget)
+        if not self._share_gaps(due):
+            for i in due:
                 self._resolve_others(int(i), time_ns)
         if self._actors is not None:
-            self._actors.resolve(used_up, time_ns)
+            self._actors.resolve(due, time_ns)
 
     def refill(self) -> bool:
-        """Queries around the UAVs whose budgets are used up; returns whether all are free.
+        """Queries around the UAVs that are due; returns whether all are free.
 
         Otherwise a UAV is in contact, or may be: call `resolve`, which goes on from here.
         """
         if self._actors is not None:
             return False
         state = self._fleet.state
-        rows = np.flatnonzero(state.contact_budget <= 0.0)
+        rows = self._due(state.contact_budget)
         if len(rows):
             found = self._query(rows)
             gaps = found.distance - self._radius[rows]
@@ -116,7 +114,18 @@ class Collisions:
                 return False
             self._touched_solid[rows[gaps > _RELEASE_M]] = -1
             state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
-        return self._share_gaps(np.flatnonzero(state.separation_budget <= 0.0))
+        return self._share_gaps(self._due(state.separation_budget))
+
+    def _due(self, budget: Array) -> NDArray[np.int64]:
+        """Returns the rows of UAVs with a used up budget, or one that may not last to the next tick.
+
+        The latter at guidance ticks only, so that the others need no single steps in between.
+        """
+        fleet = self._fleet
+        rows: NDArray[np.int64] = _rows_due(
+            budget, fleet.state.velocity_map, fleet.state.asleep, fleet.s_to_next_tick
+        )
+        return rows
 
     def _share_gaps(self, rows: NDArray[np.int64]) -> bool:
         """Does what `_resolve_others` does for each of `rows`, unless one is in contact.
@@ -323,9 +332,12 @@ def _share_gaps(
 
 
 @brief_kernel
-def _is_used_up(contact_budget: Array, separation_budget: Array) -> bool:
-    """Returns whether any UAV's budget (N,) is used up."""
-    for i in range(len(contact_budget)):
-        if contact_budget[i] <= 0.0 or separation_budget[i] <= 0.0:
-            return True
-    return False
+def _rows_due(budget: Any, velocity: Any, asleep: Any, seconds: float) -> Any:
+    """Returns the rows of budgets (N,) m that are used up or may be so in `seconds`, if above 0."""
+    found, rows = 0, np.empty(len(budget), np.int64)
+    for i in range(len(budget)):
+        limit = reach_m(velocity[i], seconds) if seconds > 0.0 and not asleep[i] else 0.0
+        if budget[i] <= limit:
+            rows[found] = i
+            found += 1
+    return rows[:found]
