@@ -15,9 +15,9 @@ from volery.control.plant_dispatch import fly_otherwise
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import CONTROL_STATE
 from volery.core.arrays import Array
+from volery.core.compiled import brief_kernel
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
-from volery.core.compiled import brief_kernel
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.contact import IMPACT, NO_TOUCH, SCRATCH_SHAPE
 from volery.vehicle.downwash import find_downwash
@@ -123,9 +123,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     each.
 
     A UAV with a new stop command is guided in the first step, without waiting for a tick. The call
-    ends early after a step in which a budget ran out, at a guidance tick before which one may run
-    out, after which the event buffer is full or, with `event_ends`, an event occurred. The air around the UAVs is updated every `air_steps`, a
-    multiple of `guidance_steps`.
+    ends early after a step in which a budget ran out, the event buffer grew full or, with
+    `event_ends`, an event occurred, and at a guidance tick if a budget may run out before the next
+    one. The air around the UAVs is updated every `air_steps`, a multiple of `guidance_steps`.
 
     calm: whether nothing can happen to a UAV before the next guidance tick. look: whether a UAV may
     have met another's jet since the last search, which is then repeated for all UAVs. At first, and
@@ -252,7 +252,9 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 way = reach_m(body.velocity_map, guidance_steps * dt)
                 to_others = min(body.contact_budget, body.separation_budget)
                 near = near or to_others <= way
-                calm = calm and model.kind == RIGID_BODY and min(to_others, body.ground_budget) > way
+                calm = (
+                    calm and model.kind == RIGID_BODY and min(to_others, body.ground_budget) > way
+                )
         step += together
         done += together
         # A look at the gaps of those that are near may spare all others single steps.

@@ -117,7 +117,7 @@ class Collisions:
         return self._share_gaps(self._due(state.separation_budget))
 
     def _due(self, budget: Array) -> NDArray[np.int64]:
-        """Returns the rows of UAVs with a used up budget, or one that may not last to the next tick.
+        """Returns the rows of UAVs whose budget is used up, or may not last to the next tick.
 
         The latter at guidance ticks only, so that the others need no single steps in between.
         """

@@ -120,8 +120,8 @@ class Engine:
         self.sink = sink
         self.inbox = inbox or CommandQueue()
         self.fuses_ticks = fuses_ticks
-        """Whether a tick goes on after distance queries that find no contact, also with `until` of a
-        run, which is then asked less often; states are the same."""
+        """Whether a tick goes on after distance queries that find no contact, also in a run with
+        `until`, which is then asked less often; states are the same."""
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called repeatedly while waiting for a lock-step partner; returns whether the run
         continues."""

@@ -17,7 +17,7 @@ class RigidBody:
 Plant: TypeAlias = RigidBody | IdentifiedModel | Kinematic
 
 RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION = 0, 1, 2
-"""Numbers of the plants in the compiled step."""
+"""Numbers of the plants in the kernels of the step."""
 
 
 def kind_of(plant: Plant) -> int:

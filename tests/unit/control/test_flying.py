@@ -455,6 +455,11 @@ def test_budgets_stop_after_a_whole_step(budget):
     getattr(fleet.state, budget)[1] = 0.5
     way = fleet.state.position_map.copy()
     done = fleet.advance(1000, FLAT.grid)
+    assert 0 < done < 45  # at the guidance tick before
+    assert fleet.step == done
+    assert fleet.s_to_next_tick == 0.008
+    while getattr(fleet.state, budget)[1] > 0.0:
+        done += fleet.advance(1000, FLAT.grid)
     assert 45 < done < 60
     assert fleet.step == done
     flown = np.linalg.norm(fleet.state.position_map - way, axis=1)
