@@ -230,7 +230,9 @@ class Engine:
             if until is not None and until():
                 return
             before = self.fleet.step
-            self._run_tick(Tick(step, fuses=self.fuses_ticks or until is None))
+            # The first tick delivers what was published before the run: it ends at the first query.
+            fuses = self.fuses_ticks or (until is None and before > 0)
+            self._run_tick(Tick(step, fuses=fuses))
             if in_pieces and (self.fleet.step < before or self.is_broken_off):
                 return
 
