@@ -77,7 +77,6 @@ def forest_passage(seed: int) -> Crowd:
     start = rows - np.array([14.0, 18.0]) + rng.uniform(-0.4, 0.4, rows.shape)
     forest = {
         "kind": "procedural",
-        "seed": seed,
         "region_m": [3.0, -40.0, 63.0, 40.0],
         "trees": 120,
         "minimum_spacing_m": 3.5,
@@ -139,6 +138,7 @@ def _scenario(crowd: Crowd, behaviour: str, seed: int) -> dict[str, Any]:
         "arrival_m": _ARRIVED_M,
     }
     world: dict[str, Any] = {
+        "seed": seed,
         "terrain": {"kind": "flat", "extent_m": 300.0},
         "wind": {"velocity_m_s": [1.5, 1.0, 0.0]},
     }
