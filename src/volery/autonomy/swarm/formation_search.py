@@ -50,19 +50,32 @@ class FormationSearch:
         self._start = start = flock_of(positions, velocities)
         self._settings = settings or AresSettings()
         self._seed, self._tries = seed, 0
-        order = np.argsort(-(start[2:].sum(axis=1) @ start[:2]), kind="stable")
-        self._core = sorted(order[:_CORE].tolist())
-        self._num_rest = len(order) - len(self._core)
+        self._num_rest = max(0, start.shape[1] - _CORE)
         self._begin_try()
         self.is_done = self.plan().is_solved
         """Whether a plan is found, or none will be."""
 
     def _begin_try(self) -> None:
         self._seed_now = self._seed + _NEXT_SEED * self._tries
+        self._core = self._foremost(self._tries)
         self._tries += 1
         core = self._start[:, self._core]
         self._search = AresSearch(core[:2].T, core[2:].T, self._seed_now, self._settings)
         self._joining: Joining | None = None
+
+    def _foremost(self, tries: int) -> list[int]:
+        """Returns the rows of the seven foremost birds: of all, then of the left, of the right.
+
+        The arms of a V without its first bird are formations, but what is foremost of both is none.
+        """
+        vx, vy = self._start[2:].sum(axis=1)
+        x, y = self._start[:2]
+        order = np.argsort(-(vx * x + vy * y), kind="stable")
+        aside = (vx * y - vy * x)[order]
+        left = aside > np.median(aside)
+        if tries and min(left.sum(), (~left).sum()) >= _CORE:
+            order = order[left if tries == 1 else ~left]
+        return sorted(order[:_CORE].tolist())
 
     def plan(self) -> AresPlan:
         """Returns the best plan so far; of a flock in which some have none, a plan of no steps."""

@@ -68,6 +68,14 @@ def test_the_arms_grow_at_their_ends_and_equally():
     assert ranks.tolist() == [1, 1, 2]
 
 
+def test_a_v_that_has_lost_its_first_bird_becomes_another_one():
+    rank = np.delete(np.arange(-10, 11), 10)
+    places = np.stack([BEST_ASIDE * rank, -BEST_BEHIND * np.abs(rank)], axis=1)
+    plan = plan_formation(places, np.tile([0.0, 0.7], (20, 1)), 1, AresSettings(limits=LIMITS))
+    assert plan.is_solved
+    assert closest(plan.positions) >= LIMITS.min_distance - 1e-3
+
+
 def test_a_flock_in_which_one_cannot_move_has_no_plan():
     """A bird accelerates by at most its speed, so one that stands remains behind."""
     places, speeds = start(9, 1)
