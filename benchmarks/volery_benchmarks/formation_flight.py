@@ -16,7 +16,7 @@ from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 
 _TOPIC = "/v_formation/status"
-_TAKE_OFF_S, _FORM_S, _RECOVER_S = 30.0, 180.0, 120.0
+_TAKE_OFF_S, _FORM_S, _RECOVER_S = 180.0, 180.0, 120.0
 _LOST = 0.1
 """Cost of a formation below which it counts as a V, as for the node."""
 

@@ -14,8 +14,10 @@ import numpy as np
 
 from volery.autonomy.status import publish_status
 from volery.autonomy.swarm.ares import AresPlan, AresSettings
+from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
 from volery.autonomy.swarm.formation_search import FormationSearch
+from volery.autonomy.swarm.orca import Orca, OrcaSettings
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
 from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.core.arrays import Array
@@ -32,8 +34,8 @@ _OVERSPEED = 1.5
 _NEAR_M = 0.4
 _DISPLACED = 1.5
 """Distance from its bird, in wing spans, at which a UAV counts as displaced."""
-_CROSSING_M = 0.5
-"""Height difference of UAVs whose ways to the start positions cross."""
+_GATHER_APART = 0.7
+"""Distance that UAVs keep on their ways to the start positions, in wing spans."""
 _BOX = 3.0
 """Side of the box of random starts of seven, wing spans, after ARES; larger teams are as dense."""
 _SEVEN = 7
@@ -95,7 +97,10 @@ class VFormation(SavedAttributes, Node):
     )
 
     PARTS = ("_team",)
-    WARMUP_TASKS = ("volery.autonomy.swarm.warmup:formation_search",)
+    WARMUP_TASKS = (
+        "volery.autonomy.swarm.warmup:formation_search",
+        "volery.autonomy.swarm.warmup:flocking",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("v_formation", **options)
@@ -118,6 +123,9 @@ class VFormation(SavedAttributes, Node):
             acceleration * self._duration_s**2 / self._span,
         )
         self._settings = AresSettings(limits=limits)
+        self._avoidance = Orca(
+            OrcaSettings(distance_m=_GATHER_APART * self._span, max_speed_m_s=max_speed)
+        )
 
         self.phase = VFormationPhase.ASCEND
         self._bird = np.zeros((len(names), 2))
@@ -323,15 +331,16 @@ class VFormation(SavedAttributes, Node):
     def _steer(self) -> None:
         """Commands the members towards their birds."""
         rows = self._team.members
-        position, _ = self._team.motion()
+        position, velocity = self._team.motion()
         is_still = self.phase is VFormationPhase.GATHER or self._hovers
         ahead = np.zeros((len(rows), 2)) if is_still else self._velocity[rows]
         wanted = ahead + _GAIN * (self._bird[rows] - position)
+        if self.phase is VFormationPhase.GATHER:
+            flock = flock_within(position, velocity, self._avoidance.radius_m)
+            wanted = self._avoidance.velocities(flock, wanted, Surroundings())
         for row, level in zip(rows, wanted, strict=True):
             speed = float(np.hypot(*level))
             height = self._height + self._height_step * (row % 2)
-            if self.phase is VFormationPhase.GATHER:
-                height += _CROSSING_M * (row % 3)
             part = min(1.0, _OVERSPEED * self._max_speed / max(speed, 1e-9))
             self._team.command(row, part * level, height)
 
