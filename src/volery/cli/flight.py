@@ -81,12 +81,12 @@ class RunOptions:
     """Names of external nodes and clients that must connect before the first step."""
     wait_timeout_s: float = DEFAULT_TIMEOUT_S
     """Wall time within which they must connect."""
+    fail_on: frozenset[str] = frozenset()
+    """Kinds of failures that the exit code reports; see `cli.flight_failures`."""
     workers: int | None = None
     """Workers among which the run is divided, besides the leader; None: it is not."""
     listen: str | None = None
     """Address at which workers of other machines join, `HOST[:PORT]`; None: they start here."""
-    fail_on: frozenset[str] = frozenset()
-    """Kinds of failures that the exit code reports; see `cli.flight_failures`."""
     drop_lost: bool = False
     """Whether the run continues without a lost worker's part; else this machine takes it over."""
     mavlink_key: Path | None = None

@@ -81,7 +81,7 @@ MODE_CHANGE = 3
 BATTERY_FELL = 4
 EVENTS_A_STEP = 4
 """Maximum number of events of one UAV in a step."""
-_REACH_M = 0.03
+_ACCELERATION_M_S2 = 1000.0
 
 
 @fused_kernel
@@ -266,11 +266,12 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
 def reach_m(velocity: Any, seconds: float) -> float:
     """Returns a safe bound of a UAV's way in the time between two guidance ticks, m.
 
-    velocity: (3,) m/s now. Twice the way at this speed plus `_REACH_M`: to exceed it in 8 ms a UAV
-    would need 940 m/s^2.
+    velocity: (3,) m/s now. Twice the way at this speed, plus that of an acceleration beyond any
+    UAV's.
     """
     vx, vy, vz = three(velocity)
-    return 2.0 * (abs(vx) + abs(vy) + abs(vz)) * seconds + _REACH_M
+    speed = abs(vx) + abs(vy) + abs(vz)
+    return 2.0 * speed * seconds + 0.5 * _ACCELERATION_M_S2 * seconds * seconds
 
 
 @inner_kernel

@@ -50,12 +50,11 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> Iterator
 
     A Twist is in the level heading frame, a pose and a trajectory in the map frame. The UAV
     ignores all of them on the ground, during take-off, landing and return, and with its rotors
-    stopped. An invalid message
-    (nan, another frame) is discarded with a logged warning, once per topic. An external client
-    learns of it, and of a goal or trajectory that is ignored (`Graph.refuse`). An accepted Twist is
-    published on `cmd_vel/applied` with the simulated time from which it acts; clients measure
-    round trips with it. The services take_off, hold, land and return_home respond with `success`
-    and a reason. Yields the function that undoes each step once the step is made.
+    stopped. An invalid message (nan, another frame) is discarded with a logged warning, once per
+    topic. An external client learns of it, and of a goal or trajectory that is ignored
+    (`Graph.refuse`). An accepted Twist is published on `cmd_vel/applied` with the simulated time
+    from which it acts; clients measure round trips with it. The services take_off, hold, land and
+    return_home respond with `success` and a reason. Yields the function that undoes each step once the step is made.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
     yield applied.cancel
