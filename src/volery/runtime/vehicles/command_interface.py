@@ -54,7 +54,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> Iterator
     topic. An external client learns of it, and of a goal or trajectory that is ignored
     (`Graph.refuse`). An accepted Twist is published on `cmd_vel/applied` with the simulated time
     from which it acts; clients measure round trips with it. The services take_off, hold, land and
-    return_home respond with `success` and a reason. Yields the function that undoes each step once the step is made.
+    return_home respond with `success` and a reason. Yields the function that undoes each step
+    once the step is made.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
     yield applied.cancel
