@@ -61,7 +61,7 @@ def test_task_runs(task, recorded, tmp_path):
         env={**os.environ, "MPLBACKEND": "Agg"},
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr
     if task == "monte_carlo":

@@ -27,7 +27,7 @@ def run(name, folder):
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -35,7 +35,6 @@ _TESTS = Path(__file__).parent.parent
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 def test_digests_of_caches_filled_in_other_orders_are_equal(tmp_path: Path) -> None:
     """One by a first start, with its helper; one backwards, by another process than flies."""
     with ThreadPoolExecutor() as pool:

@@ -41,7 +41,6 @@ _REASON = "a `warmup_tasks` of a node, or `runtime.warmup`, lacks what compiles 
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 def test_nothing_is_compiled_in_flight() -> None:
     """The search flies until places were seen again and ways planned anew."""
     flights = (("forest_search", 70), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
@@ -57,7 +56,6 @@ def test_nothing_is_compiled_in_flight() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
     """Motion and places lost and found, many divisions of maps: what unit tests have nodes do."""
     needed = tmp_path / "needed.json"

@@ -49,7 +49,7 @@ class Speaker(Node):
     def speak(self):
         self.get_logger().info(f"{self.get_namespace()} speaks")
 """
-END_S = 120.0
+END_S = 600.0
 
 
 @pytest.fixture

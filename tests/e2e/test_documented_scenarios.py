@@ -23,7 +23,7 @@ def test_the_examples_run(tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr
     first, changed, refused, count, *scans, last = done.stdout.splitlines()

@@ -29,7 +29,7 @@ def test_example(example, tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()

@@ -17,7 +17,7 @@ def test_the_code_of_the_page_runs(tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr
     assert "go_to of uav1 failed at" in done.stdout

@@ -345,7 +345,7 @@ def test_a_flight_of_the_command_line_is_repeated(tmp_path):
 
     def again(*more, scenario="hover"):
         command = [*words[:4], scenario, "--digest", "--replay-commands", path, *more]
-        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=900)
         assert "Traceback" not in done.stderr
         return done
 

@@ -54,7 +54,7 @@ type = "f450"
 position_m = [0.0, 0.0]
 on_start = "take_off"
 """
-HANG_S = 300
+HANG_S = 600.0
 
 
 @pytest.fixture

@@ -88,7 +88,7 @@ def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp
         check=True,
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=900,
     )
     assert ast.literal_eval(done.stdout.strip().splitlines()[-1]) == digest(said)
     _maps_alike(path, said["odom"])

@@ -21,7 +21,6 @@ def tutorial():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_tutorial(tutorial, page, tmp_path):
     port = own_port()

@@ -35,7 +35,7 @@ def start(simulate, flat_data):
     return start
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_two_nodes_that_answer_each_other_are_named(start):
     start("ping", "/a", "/b")
     start("pong", "/b", "/a")
@@ -46,7 +46,7 @@ def test_two_nodes_that_answer_each_other_are_named(start):
         assert word in str(caught.value)
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_a_node_that_answers_itself_is_named(start):
     start("self", "/a", "/a")
     start.simulation.graph.advertise("/a", String).publish(String("x"))
@@ -54,7 +54,7 @@ def test_a_node_that_answers_itself_is_named(start):
         start.simulation.step(1)
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_a_client_that_starts_such_a_loop_does_not_end_the_run(start, caplog):
     start("ping", "/a", "/b")
     start("pong", "/b", "/a")
@@ -66,7 +66,7 @@ def test_a_client_that_starts_such_a_loop_does_not_end_the_run(start, caplog):
     start.simulation.step(1)
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_a_loop_that_multiplies_ends_too(monkeypatch):
     monkeypatch.setattr("volery.graph.response_chains._MAX_RESPONSES_AT_ONCE", 5_000)
     graph = Graph(lambda: 0)
@@ -105,7 +105,7 @@ class PressedError(Exception):
     """What the command line raises between two steps once Ctrl-C was pressed."""
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
@@ -118,7 +118,7 @@ def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
         simulation.run(1.0, on_progress=look)
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
@@ -127,7 +127,7 @@ def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
     assert simulation.clock.quitting
 
 
-@pytest.mark.timeout(240, func_only=True)
+@pytest.mark.timeout(600, func_only=True)
 def test_quit_in_a_meeting_ends_the_run(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)

@@ -374,7 +374,7 @@ def test_helper_processes_import_nothing_from_the_working_folder(
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", script],
-        cwd=trap.folder, env=environment, timeout=250, check=False,
+        cwd=trap.folder, env=environment, timeout=900, check=False,
     )  # fmt: skip
     assert done.returncode == 0
     assert not trap.has_run
@@ -393,7 +393,7 @@ def test_a_process_starts_no_code(trap: Trap, tmp_path: Path, cwd: str) -> None:
             stdin=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
-            timeout=250,
+            timeout=900,
             check=False,
         )
         assert done.returncode == 2

@@ -22,7 +22,7 @@ from volery.server.settings import PageSettings
 DESCRIPTORS = 256
 """Of the servers' process: soft limit, and hard limit."""
 STORM = 400
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 SERVERS = """
     import asyncio, json, os, resource, sys, threading
     resource.setrlimit(resource.RLIMIT_NOFILE, ({descriptors}, {descriptors}))

@@ -26,7 +26,7 @@ from volery.graph.messages import Published, String
 
 FORMATS = [".mcap", ".bag"]
 TERM, HUP, INT = signal.SIGTERM, signal.SIGHUP, signal.SIGINT
-HANG_S = 120.0
+HANG_S = 600.0
 CLI = [sys.executable, "-m", "volery"]
 FAKES = Path(__file__).parents[1] / "unit" / "cli"
 FLIES = f"""

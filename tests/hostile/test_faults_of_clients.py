@@ -247,7 +247,6 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
 def test_nasty_values_in_every_field_of_every_service(whole):
     client = Client(whole)
@@ -271,7 +270,6 @@ def test_nasty_values_in_every_field_of_every_service(whole):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
 @pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
 def test_nasty_values_in_every_field_of_every_topic(whole):
     client = Client(whole)

@@ -14,7 +14,7 @@ from volery.mavlink.links.rate_limits import FRAMES_PER_S, RateLimits
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.links.udp_bridge import _UdpLink
 
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 
 
 class Clock:

@@ -140,7 +140,7 @@ def test_the_end_by_a_signal_forgets_nothing(state: Path) -> None:
     ended = subprocess.run(
         [sys.executable, "-P", "-c", script],
         env={**os.environ, "XDG_STATE_HOME": str(state.parent)},
-        timeout=250,
+        timeout=900,
         check=False,
     )
     assert ended.returncode == -9

@@ -19,7 +19,7 @@ from volery.bridges.ros1.environment import load_rospy, rospy_is_installed
 from volery.core.connection_limits import ConnectionLimits
 from volery.core.listener import MAX_UNPROVEN, open_listener
 
-HANG_S = 60.0
+HANG_S = 600.0
 HEADER = b"\x0a\0\0\0\x06\0\0\0topic="
 needs_rospy = pytest.mark.skipif(not rospy_is_installed(), reason="rospy is not installed")
 

@@ -29,7 +29,7 @@ from volery.server.page_server import PageServer
 from volery.server.settings import PageSettings
 
 TOKEN = "the right one"
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 HOUR_S = 3600.0
 HERE, ELSEWHERE = "127.0.0.1", "127.0.0.2"
 """Addresses of clients; both are of this machine, and count as two."""

@@ -121,7 +121,6 @@ every_node = pytest.mark.parametrize("flown", NODES, indirect=True)
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 @every_node
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_hard_values_on_every_topic_of_every_node(flown):
@@ -136,7 +135,6 @@ def test_hard_values_on_every_topic_of_every_node(flown):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 @every_node
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_hard_values_of_every_parameter_of_every_node(flown):

@@ -32,7 +32,7 @@ from volery.mavlink.codec import dialect
 from volery.mavlink.hil.px4_bridge import Px4Bridge
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "CONNECT", "OPTIONS", "TRACE", "PATCH")
 HELLO_OF_TLS = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"
 

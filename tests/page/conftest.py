@@ -1,7 +1,6 @@
 """A server and a browser for each module of page tests, and a page for each test."""
 
 import importlib.util
-from pathlib import Path
 
 import pytest
 
@@ -18,13 +17,6 @@ COMPOSED_PLAINLY = ("--disable-gpu-compositing", "--disable-gpu-rasterization")
 seven times the processor's time of a frame."""
 
 collect_ignore_glob = ["test_page_*.py"] if MISSING else []
-
-
-def pytest_collection_modifyitems(items):
-    """A busy machine may take minutes over a test that takes seconds else."""
-    for item in items:
-        if Path(__file__).parent in item.path.parents:
-            item.add_marker(pytest.mark.timeout(900))
 
 
 @pytest.fixture(scope="session")

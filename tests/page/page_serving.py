@@ -11,7 +11,7 @@ import roslibpy
 
 from volery_benchmarks.page.serving import PageProcess
 
-ANSWER_S = 180.0
+ANSWER_S = 600.0
 
 
 class Served(PageProcess):

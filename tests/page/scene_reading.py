@@ -8,7 +8,7 @@ import time
 import numpy as np
 from PIL import Image
 
-DRAWN_S = 180.0
+DRAWN_S = 600.0
 """A loaded machine draws WebGL slowly."""
 
 

@@ -12,7 +12,7 @@ from scene_reading import wait_for_picture, wait_until
 from truth import until
 from working import WIDE, pull
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 WIDTH, HEIGHT = 80, 60
 BLOCKS = "0,0,0,0\n0,0,0,1\n0,0,0,0\n1,0,0,0\n"

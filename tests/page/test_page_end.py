@@ -6,7 +6,7 @@ from page_serving import Served
 from truth import first_after_return, heard_status, set_speed, stamp_ns, status, until
 from working import SMALL
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.slow
 
 END_NS = 3_000_000_000
 SLOW, UNBOUNDED = 0.1, 0.0

@@ -10,7 +10,7 @@ from page_browsing import keep_picture
 from page_serving import Served
 from working import open_panel, panel_button
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 LARGE = {"width": 1280, "height": 800}
 IMAGE, SCRIPT = TEXTS[:2]

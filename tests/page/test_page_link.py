@@ -30,7 +30,7 @@ def clock_s(page):
     return 60 * int(minutes) + float(seconds)
 
 
-def wait_for_clock(page, fits, timeout_s=180.0):
+def wait_for_clock(page, fits, timeout_s=600.0):
     ends = time.monotonic() + timeout_s
     while not fits(clock_s(page)):
         assert time.monotonic() < ends, f"the page's clock shows {clock_s(page)} s"

@@ -12,10 +12,10 @@ from working import WIDE, choose, inspect, open_panel, set_slider
 from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import LogWalk
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 STATES = ("/ground_truth/tf", "/uav1/odom", "/uav2/odom", "/uav1/imu", "/uav2/imu")
-REPEATED_S = 400.0
+REPEATED_S = 900.0
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from scene_reading import on_screen, wait_for_picture, wait_until
 from truth import hurried, pass_seconds, place, until, vehicle
 from working import WIDE, inspect, open_panel
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 OPERATORS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
 WHY_NOT = "View-only access: commands require an operator token"

@@ -14,7 +14,7 @@ from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
 from truth import put, status, until, vehicle
 from working import SMALL
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 LOOK = "#view=fly&camera=-28_0_2.5_0_0_0&quality=minimal"
 """From the west, level, at the origin."""

@@ -8,7 +8,7 @@ from scene_reading import eye, pixels, wait_for_frames, wait_for_picture, wait_u
 from truth import hurried, place, vehicle
 from working import SMALL, press_canvas, pull
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 SCANNED = """
 name = "scanned"

@@ -11,7 +11,7 @@ from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
 from truth import until, vehicle
 from working import SMALL, choose, open_panel, set_slider
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 GROVE = """
 name = "grove"

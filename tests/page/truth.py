@@ -10,7 +10,7 @@ VEHICLES = "volery_interfaces/msg/VehicleStates"
 STATUS = "volery_interfaces/msg/SimulationStatus"
 
 
-def until(fits, timeout_s=180.0, what="it did not become true"):
+def until(fits, timeout_s=600.0, what="it did not become true"):
     """The first answer of `fits()` that is true."""
     ends = time.monotonic() + timeout_s
     while not (found := fits()):
@@ -19,7 +19,7 @@ def until(fits, timeout_s=180.0, what="it did not become true"):
     return found
 
 
-def vehicle(served, uav, fits=lambda _: True, timeout_s=180.0):
+def vehicle(served, uav, fits=lambda _: True, timeout_s=600.0):
     """The UAV, once it is so."""
     found = {}
 
@@ -37,7 +37,7 @@ def place(served, uav):
     return at["x"], at["y"], at["z"]
 
 
-def status(served, fits=lambda _: True, timeout_s=180.0):
+def status(served, fits=lambda _: True, timeout_s=600.0):
     """What the simulation says of itself, once it is so."""
     return served.once("/volery/status", STATUS, fits, timeout_s)
 
@@ -89,7 +89,7 @@ def hurried(served):
         set_speed(served, 1.0)
 
 
-def weather(served, fits=lambda _: True, timeout_s=180.0):
+def weather(served, fits=lambda _: True, timeout_s=600.0):
     """The weather, once it is so."""
     ends = time.monotonic() + timeout_s
     while not fits(told := served.call("/volery/get_weather", "volery_interfaces/srv/GetWeather")):

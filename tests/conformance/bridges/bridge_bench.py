@@ -28,7 +28,7 @@ IMAGE = "sensor_msgs/msg/Image"
 TRIGGER = "std_srvs/srv/Trigger"
 LIMIT_BYTES = 12 << 20
 """Of one message, where a bridge can be told."""
-PATIENCE_S = 180.0
+PATIENCE_S = 600.0
 _TCP_REPAIR = 19
 
 Triggered = message_type(f"{TRIGGER}_Response")

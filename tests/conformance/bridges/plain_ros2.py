@@ -43,7 +43,7 @@ CONFIG = """<CycloneDDS><Domain id="any">
     <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
-MATCH_S = 150.0
+MATCH_S = 600.0
 PICTURE_HEAD = 1000
 """Bytes of a picture that are reported. A pipe takes a line below 4096 bytes as one: a process that
 is stopped while it writes leaves no half line."""

@@ -200,7 +200,7 @@ def test_one_missing_folder_is_made(invoke: Invoke, tmp_path: Path) -> None:
 
 
 def wait_for(process: subprocess.Popen[str], condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 120.0
+    end = time.monotonic() + 600.0
     while not condition():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
@@ -222,7 +222,7 @@ def test_ctrl_c_while_kernels_compile(tmp_path: Path) -> None:
     ) as process:
         wait_for(process, lambda: any(cache.glob("volery/kernels/*/*/*.nbi")))
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=300)
+        out, err = process.communicate(timeout=900)
     # Python ends by the signal itself where it met it in an `exec`; shells call that 130 too.
     assert process.returncode in (130, -signal.SIGINT), err
     assert out == "hover: compiling; later runs start at once\n"
@@ -278,7 +278,7 @@ def test_ctrl_c_in_an_awkward_place(part: str, said: str) -> None:
     command = [sys.executable, "-c", program, str(Path(__file__).parent), "run", "hover"]
     pipe = subprocess.PIPE
     with start_child(command, stdout=pipe, stderr=pipe, text=True) as process:
-        output = process.communicate(timeout=300)
+        output = process.communicate(timeout=900)
     assert process.returncode == 130
     assert output == (said, "Stopped with Ctrl-C before the flight began\n")
 
@@ -292,7 +292,7 @@ def test_ctrl_c_in_mid_flight(tmp_path: Path, suffix: str) -> None:
     with start_child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         wait_for(process, lambda: log.exists() and log.stat().st_size > 100_000)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=300)
+        out, err = process.communicate(timeout=900)
     assert process.returncode == 130, err
     assert err == ""
     assert "Stopped with Ctrl-C: flew" in out

@@ -72,7 +72,7 @@ def sweep(tmp_path_factory):
         ) as head,
     ):
         try:
-            until = time.monotonic() + 120.0
+            until = time.monotonic() + 600.0
             while "Ray runtime started" not in (folder / "head.log").read_text():
                 assert head.poll() is None
                 assert time.monotonic() < until

@@ -103,7 +103,7 @@ def test_a_killed_study_continues_to_the_table_of_an_uninterrupted_one(tmp_path)
     command = [sys.executable, "-m", "volery", "sweep", str(path), "--workers", "1", "--trust"]
     with subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.DEVNULL) as driver:
         try:
-            until = time.monotonic() + 120.0
+            until = time.monotonic() + 600.0
             while not list(out.glob("runs/*/*.json")):
                 assert driver.poll() is None
                 assert time.monotonic() < until

@@ -71,7 +71,7 @@ class Answer:
 
 def ask(server, path, method="GET", body=None, **headers):
     """One request; the path goes out as it stands. Underlines in names of headers are dashes."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=320)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=900)
     try:
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, body, named)
