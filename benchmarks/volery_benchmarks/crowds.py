@@ -6,9 +6,11 @@ A run is free of collisions if no UAV touches another one or a tree until all ha
 from __future__ import annotations
 
 import json
+import logging
 import multiprocessing
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from volery.graph.messages import Published
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 
+_LOG = logging.getLogger(__name__)
 _TAKE_OFF_S, _FLIGHT_S = 10.0, 150.0
 _HEIGHT_M = 5.0
 _ARRIVED_M = 1.5
@@ -94,16 +97,23 @@ SITUATIONS: dict[str, Callable[[int], Crowd]] = {
 
 def fly_all(situation: str, behaviour: str, runs: int) -> list[CrowdFlight]:
     """Returns the results of runs with different seeds, as many at once as there are cores."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(usable_cores(), context) as pool:
-        tasks = [(situation, behaviour, seed) for seed in range(1, runs + 1)]
-        return list(pool.map(_fly, *zip(*tasks, strict=True)))
+    seeds = range(1, runs + 1)
+    context, flights = multiprocessing.get_context("spawn"), list[CrowdFlight]()
+    with ProcessPoolExecutor(min(usable_cores(), runs), context) as pool:
+        fly_seed = partial(_fly_seed, situation, behaviour)
+        for seed, flight in zip(seeds, pool.map(fly_seed, seeds), strict=True):
+            flights.append(flight)
+            _LOG.info("%s, %s, seed %d: %s", situation, behaviour, seed, flight)
+    return flights
 
 
-def _fly(situation: str, behaviour: str, seed: int) -> CrowdFlight:
+def _fly_seed(situation: str, behaviour: str, seed: int) -> CrowdFlight:
+    return fly(SITUATIONS[situation](seed), behaviour, seed)
+
+
+def fly(crowd: Crowd, behaviour: str, seed: int) -> CrowdFlight:
     """Flies a run until all UAVs in the air have arrived."""
-    crowd = SITUATIONS[situation](seed)
-    scenario = parse_scenario(_scenario(crowd, behaviour, seed), where=situation)
+    scenario = parse_scenario(_scenario(crowd, behaviour, seed), where="crowd")
     status: dict[str, Any] = {}
     least = np.inf
     with Simulation(scenario, threads=1) as simulation:

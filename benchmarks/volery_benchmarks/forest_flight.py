@@ -12,14 +12,15 @@ import numpy as np
 from volery.core.arrays import Array
 from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
-from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
-from volery.report.logged_flights import ESTIMATES, TRUTH
+from volery.report.logged_flights import TRUTH
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
+from volery.results.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
 from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
+from volery.verdicts.observing import ESTIMATES
 
 SIGHT_M = 6.0
 """Distance up to which the task manager counts a position as seen, m."""

@@ -1,30 +1,52 @@
-"""Measures swarms: plans that lead random flocks into a V, as ARES does, and flights by them.
+"""Measures swarms: plans that lead random flocks into a V, as ARES does, flights by them, crowds.
 
 Starts are those of the paper (A. Lukina et al., TACAS 2017): seven birds in a box of 3 wing spans,
 at least 1 apart, speeds from .25 to .75 per axis. ARES reports 95 % of 8,000 starts and 63 s.
+Each part is a function that returns figures; `measure(only=...)` runs some of them.
 """
 
 from __future__ import annotations
 
+import logging
 import statistics
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
 from volery.autonomy.swarm.formation_search import plan_formation
 from volery.core.arrays import Array
 from volery.core.machine import usable_cores
+from volery_benchmarks import crowds, formation_games
 from volery_benchmarks.formation_flight import fly
+from volery_benchmarks.registry import chosen_parts
 
+_LOG = logging.getLogger(__name__)
 _BIRDS = 7
 _BOX, _APART = 3.0, 1.0
 _SPEEDS = 0.25, 0.75
 _STARTS, _QUICK_STARTS = 1000, 20
 _FLIGHTS, _QUICK_FLIGHTS = 100, 2
+_GAMES, _QUICK_GAMES = 100, 2
+_RUNS = {"orca": 100, "vasarhelyi": 10, "olfati_saber": 10}
+"""Runs of each situation; rules of flocks, beside which ORCA flies, mostly use the whole time."""
 
 
-def measure(*, quick: bool = False) -> dict[str, float]:
+def measure(*, quick: bool = False, only: Sequence[str] = ()) -> dict[str, float]:
+    """Returns the figures of the parts named in `only`, by default of all.
+
+    Raises `VoleryError` for an unknown part.
+    """
+    figures: dict[str, float] = {}
+    for name in chosen_parts("swarm", PARTS, only):
+        _LOG.info("%s", name)
+        figures |= PARTS[name](quick)
+    return figures
+
+
+def _plans(quick: bool) -> dict[str, float]:
     """Returns how many random starts end in a V, and the CPU time of a plan."""
     plan_formation(*_start(0))  # compiles
     seeds = range(_QUICK_STARTS if quick else _STARTS)
@@ -35,12 +57,12 @@ def measure(*, quick: bool = False) -> dict[str, float]:
         "ares_s_mean": statistics.fmean(seconds),
         "ares_s_median": statistics.median(seconds),
         "ares_s_max": max(seconds),
-        **_flights(_QUICK_FLIGHTS if quick else _FLIGHTS),
     }
 
 
-def _flights(count: int) -> dict[str, float]:
+def _flights(quick: bool) -> dict[str, float]:
     """Returns the figures of flights of seven F450s that lose one or two of them."""
+    count = _QUICK_FLIGHTS if quick else _FLIGHTS
     fly(0, _BIRDS, 1)  # compiles
     figures: dict[str, float] = {}
     for lost, word in ((1, "one"), (2, "two")):
@@ -59,6 +81,37 @@ def _flights(count: int) -> dict[str, float]:
                 "v_real_time_factor": statistics.median(f.real_time_factor for f in flights),
             }
     return figures
+
+
+def _games(quick: bool) -> dict[str, float]:
+    """Returns the shares of games that the search wins against an attacker."""
+    return formation_games.play(_QUICK_GAMES if quick else _GAMES)
+
+
+def _crowd(situation: str, quick: bool) -> dict[str, float]:
+    """Returns the figures of a situation with each behaviour."""
+    figures: dict[str, float] = {}
+    for behaviour, runs in _RUNS.items():
+        flights = crowds.fly_all(situation, behaviour, 1 if quick else runs)
+        figures |= {
+            f"{situation}_{behaviour}_{word}": value
+            for word, value in (
+                ("collisions", float(sum(flight.crashed > 0 for flight in flights))),
+                ("arrived", statistics.fmean(flight.arrived for flight in flights)),
+                ("s_median", statistics.median(flight.seconds for flight in flights)),
+                ("least_distance_m", min(flight.least_distance_m for flight in flights)),
+            )
+        }
+    return figures
+
+
+PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
+    "plans": _plans,
+    "flights": _flights,
+    "games": _games,
+    **{situation: partial(_crowd, situation) for situation in crowds.SITUATIONS},
+}
+"""Functions of the parts; their argument is `quick`."""
 
 
 def _plan(seed: int) -> tuple[bool, float]:

@@ -280,6 +280,29 @@ def test_faults(simulate, kind):
 
 
 @every_kind
+def test_noise_of_a_fault(simulate, kind):
+    """Every measured number has its own; the draws of other sensors and later ones stay."""
+    measure, sound = (Measuring(simulate, scenario(kind, uavs=2)) for _ in range(2))
+    first = measure(0)
+    sound(0)
+    measured = type(first).MEASURED
+    faults = measure.bank.faults
+    faults.set(1, "noisy", [1e-3] * sum(measured.values()))
+    samples, expected = measure(1), sound(1)
+    assert_same(samples, expected, 0, 0)
+    for name in measured:
+        with np.errstate(invalid="ignore"):
+            moved = (getattr(samples, name)[1] - getattr(expected, name)[1]).ravel()
+        moved = moved[np.isfinite(moved)]
+        assert moved.size
+        assert (np.abs(moved) < 0.01).all()
+        assert len(np.unique(moved)) > 0.5 * moved.size
+        assert moved.any()
+    faults.clear(1)
+    assert_same(measure(2), sound(2))
+
+
+@every_kind
 def test_a_dropped_sensor_is_silent_on_the_graph(simulate, kind):
     simulation = simulate(scenario(kind, uavs=2))
     (bank,) = simulation._engine.banks

@@ -60,6 +60,30 @@ def test_sensors_fall_silent_stick_and_err(simulate, airborne):
     assert len(set(rates[times > 0.5])) == 1
 
 
+def test_noise_disturbs_a_published_position_and_its_autopilot_not(simulate, airborne):
+    """Odometry with noise of 0.5 m for a second, on the graph; the same again after a restore."""
+    simulation = simulate(airborne)
+    got = messages(simulation, "/uav1/odom")
+    fault = {"kind": "sensor", "uav": "uav1", "sensor": "odom", "effect": "noisy",
+             "sigma": [0.5, 0.5, 0.0], "at_s": 0.5, "until_s": 1.5}  # fmt: skip
+    simulation.faults.inject(fault)
+    kept = simulation.snapshot()
+    flights = []
+    for _ in range(2):
+        got.clear()
+        simulation.run(2.0)
+        times = np.array([m.time_ns for m in got]) / 1e9
+        points = (m.message.pose.pose.position for m in got)
+        flights.append(np.array([[p.x, p.y, p.z] for p in points]))
+        noisy = flights[-1][(times > 0.5) & (times <= 1.5)]
+        assert np.abs(flights[-1][(times <= 0.5) | (times > 1.5)][:, :2]).max() < 0.05
+        np.testing.assert_allclose(noisy[:, :2].std(axis=0), 0.5, rtol=0.4)
+        assert np.abs(noisy[:, 2] - 20.0).max() < 0.05
+        np.testing.assert_allclose(simulation.uavs["uav1"].position_map, [0, 0, 20], atol=0.05)
+        simulation.restore(kept)
+    np.testing.assert_array_equal(*flights)
+
+
 def test_gust_pushes_and_displacement_moves(simulate, airborne):
     airborne["faults"] = [
         {"kind": "gust", "velocity_m_s": [8.0, 0.0, 0.0], "rise_s": 0.2, "hold_s": 0.5, "at_s": 1.0}
@@ -117,6 +141,9 @@ def test_faults_are_part_of_what_is_kept(simulate, airborne):
         ({"kind": "sensor", "uav": "uav1", "sensor": "x", "effect": "stuck"}, "known: imu"),
         ({"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "biased", "bias": [1.0]},
          "6 finite numbers"),
+        ({"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "noisy", "sigma": [1.0]},
+         "the sigma must be 6 finite numbers"),
+        ({"kind": "jamming", "position_m": [0.0, 0.0, 5.0]}, "the scenario has no .radio."),
         ({"kind": "gnss_loss", "uav": "uav1"}, "no GNSS receiver"),
     ],
 )  # fmt: skip
@@ -135,6 +162,11 @@ def test_faults_that_cannot_be_are_refused(simulate, airborne, fault, words):
         {"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 2.0, "until_s": 1.0},
         {"kind": "motor", "uav": "uav1", "rotor": 0, "thrust_factor": 1.5},
         {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "stuck", "bias": [1.0]},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "stuck", "sigma": [1.0]},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "noisy"},
+        {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "noisy", "sigma": [-1.0]},
+        {"kind": "jamming", "uav": "uav1", "position_m": [0.0, 0.0, 5.0]},
+        {"kind": "jamming", "position_m": [0.0, 0.0, 5.0], "at_s": 2.0, "until_s": 1.0},
         {"kind": "plague", "uav": "uav1"},
     ],
 )

@@ -261,7 +261,7 @@ def test_without_a_terminal_code_beside_a_file_is_refused(
         trap.file.write_text(f'[[launch]]\nnode = "{trap.node}"\n')
     done = invoke(*words, trap.file)
     assert done.exit_code == 2
-    assert f"runs code that lies beside it ({trap.module}); give --trust" in done.stderr
+    assert f"runs code of its own ({trap.module}); give --trust" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not trap.has_run
 
@@ -318,7 +318,7 @@ def test_an_answer_at_a_terminal_is_remembered(
     for typed in ("n\n", "\n"):  # the default is no
         refused = invoke("run", trap.file, typed=typed)
         assert refused.exit_code == 2
-        assert f"runs code that lies beside it: {trap.module}" in refused.stderr
+        assert f"runs code of its own: {trap.module}" in refused.stderr
     assert not trap.has_run
     asked = invoke("run", trap.file, typed="y\n")
     assert asked.exit_code == 0, asked.stderr
@@ -328,7 +328,7 @@ def test_an_answer_at_a_terminal_is_remembered(
     monkeypatch.setattr(trust, "at_terminal", lambda: False)
     again = invoke("run", trap.file)
     assert again.exit_code == 0
-    assert "lies beside it" not in again.stderr
+    assert "code of its own" not in again.stderr
 
 
 def test_what_is_remembered_is_of_one_file_and_its_modules(
@@ -357,6 +357,36 @@ def test_what_is_remembered_is_of_one_file_and_its_modules(
 
 
 # --------------------------------------------------------------------- processes as users have them
+
+
+@pytest.mark.parametrize("command", ["run", "test"])
+@pytest.mark.parametrize("function", ["beside", "installed"])
+def test_predicates_need_trust(trap: Trap, command: str, function: str) -> None:
+    """They are called with any arguments, so that installed functions do harm as well."""
+    names = {"beside": trap.node, "installed": "os:mkdir"}
+    made = trap.folder / "made"
+    text = TOML[: TOML.index("[[nodes]]")] + (
+        f'[[expect]]\nkind = "predicate"\nfunction = "{names[function]}"\n'
+        f'parameters = {{ path = "{made}" }}\n'
+    )
+    trap.file.write_text(text)
+    done = CliRunner().invoke(app, [command, str(trap.file)])
+    assert done.exit_code == 2
+    assert "runs code of its own" in done.stderr
+    assert not trap.has_run
+    assert not made.exists()
+
+
+def test_metrics_of_a_study_need_trust(trap: Trap) -> None:
+    made, study = trap.folder / "made", trap.folder / "study.toml"
+    study.write_text(
+        'name = "small"\nscenario = "hover"\nduration_s = 0.1\n'
+        f'metrics = [{{ name = "x", function = "os:mkdir", parameters = {{ path = "{made}" }} }}]\n'
+    )
+    done = CliRunner().invoke(app, ["sweep", str(study), "--workers", "0"])
+    assert done.exit_code == 2
+    assert "runs code of its own (os)" in done.stderr
+    assert not made.exists()
 
 
 @pytest.mark.slow

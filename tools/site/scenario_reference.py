@@ -23,6 +23,7 @@ All tables of a scenario file with their keys. [Scenarios](../scenarios.md) expl
 each table is a class: see [scenarios in Python](../scenarios_in_python.md). `volery schema` prints
 the same as a JSON schema, [for editors](../scenarios.md#editors).
 """
+_EXPECTATIONS = [model for model in models() if model.__name__.endswith("Expectation")]
 EXAMPLES: dict[str, Any] = {
     "Actor.name": "walker",
     "AttachedActor.actor": "van",
@@ -46,6 +47,8 @@ EXAMPLES: dict[str, Any] = {
     "Gust.start_s": 20.0,
     "GustFault.velocity_m_s": [6.0, 0.0, 0.0],
     "InventoryForest.species_map": {"Quercus alba": "broadleaf"},
+    "JammingFault.position_m": [60.0, 0.0, 5.0],
+    "JammingFault.until_s": 40.0,
     "LidarSensor.intensities": True,
     "LidarSensor.topic": "points/front",
     "MagneticField.declination_deg": 3.5,
@@ -58,8 +61,40 @@ EXAMPLES: dict[str, Any] = {
     "SensorFault.bias": [0.0, 0.0, 0.3],
     "SensorFault.effect": "biased",
     "SensorFault.sensor": "imu",
+    "SensorFault.sigma": [0.5, 0.5, 0.1],
     "SensorFault.until_s": 40.0,
+    **{f"{model.__name__}.name": "a calm flight" for model in _EXPECTATIONS},
+    **{
+        f"{model.__name__}.until_s": 40.0
+        for model in _EXPECTATIONS
+        if "until_s" in model.model_fields
+    },
+    "AreaExpectation.at_least_m2": 400.0,
+    "ArrivalExpectation.by_s": 30.0,
+    "ArrivalExpectation.position_m": [40.0, 0.0, 5.0],
+    "BatteryExpectation.at_least": 0.3,
+    "ClearanceExpectation.at_least_m": 1.0,
+    "EstimateErrorExpectation.at_most_m": 0.2,
+    "FormulaExpectation.formula": "always(z > 1 and speed < 5, 5, 40)",
+    "LimitsExpectation.corridor_m": [[0.0, 0.0], [50.0, 0.0], [50.0, 50.0]],
+    "LimitsExpectation.height_m": [1.0, 30.0],
+    "LimitsExpectation.radius_m": 5.0,
+    "LimitsExpectation.region_m": [-10.0, -10.0, 60.0, 60.0],
+    "ModesExpectation.by_s": 30.0,
+    "ModesExpectation.modes": ["take_off", "land", "landed"],
+    "NeesExpectation.at_most": 6.0,
+    "PredicateExpectation.function": "own_checks:lands_near",
+    "PredicateExpectation.parameters": {"limit_m": 2.0},
+    "RealTimeFactorExpectation.at_least": 1.0,
+    "SeparationExpectation.at_least_m": 2.0,
+    "SpeedExpectation.at_most_m_s": 5.0,
     "Stereo.baseline_m": 0.12,
+    "TopicRateExpectation.at_least_hz": 9.0,
+    "TopicRateExpectation.topic": "slam/pose",
+    "TopicValueExpectation.at_least": 2.0,
+    "TopicValueExpectation.at_most": 8.0,
+    "TopicValueExpectation.equals": "cruise",
+    "TopicValueExpectation.topic": "/v_formation/status",
     "UavType.identified_model": "f450",
     "UserMesh.up": "z",
     "Weather.dust_visibility_m": 300.0,

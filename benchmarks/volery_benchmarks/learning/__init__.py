@@ -10,7 +10,7 @@ import logging
 from collections.abc import Sequence
 
 from volery.core.errors import VoleryError
-from volery_benchmarks.registry import Measured
+from volery_benchmarks.registry import Measured, chosen_parts
 
 PARTS = {
     "state": "throughput",
@@ -33,13 +33,10 @@ def measure(*, only: Sequence[str] = ()) -> Measured:
 
     Parts that cannot be measured are in `failures`. Raises `VoleryError` for an unknown part.
     """
-    unknown = [name for name in only if name not in PARTS]
-    if unknown:
-        raise VoleryError(f"bench learning has no part '{unknown[0]}': {', '.join(PARTS)}")
     figures: dict[str, float] = {}
     failures: dict[str, str] = {}
     versions: dict[str, str] = {}
-    for name in only or PARTS:
+    for name in chosen_parts("learning", PARTS, only):
         _LOG.info("%s", name)
         module = importlib.import_module(f"volery_benchmarks.learning.{PARTS[name]}")
         try:

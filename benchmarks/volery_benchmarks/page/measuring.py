@@ -16,7 +16,7 @@ import numpy as np
 from volery.core.errors import VoleryError
 from volery_benchmarks.page import worlds
 from volery_benchmarks.page.browser import open_browser
-from volery_benchmarks.page.cost import clients_figures, stall_figures
+from volery_benchmarks.page.cost import clients_figures, pace, stall_figures
 from volery_benchmarks.page.looking import (
     first_picture_s,
     frame_work,
@@ -50,6 +50,7 @@ def measure(soak_s: float = SOAK_S) -> Measured:
             "age": lambda: _age(browser),
             "50 UAVs": lambda: _crowd(browser, 50),
             "256 UAVs": lambda: _crowd(browser, 256),
+            "1,000 UAVs": lambda: _crowd(browser, 1000) | _large_crowd(browser, 1000),
             "forest": lambda: _forest(browser),
             "other clients": lambda: _others(browser),
             "memory": lambda: _memory(browser, soak_s),
@@ -106,6 +107,17 @@ def _crowd(browser: Browser, uavs: int) -> dict[str, float]:
         f"script_ms_{uavs}_uavs": work["script_ms"],
         f"update_ms_{uavs}_uavs": work["update_ms"],
     }
+
+
+def _large_crowd(browser: Browser, uavs: int) -> dict[str, float]:
+    """Returns the age of what is shown of a crowd, and the real-time factor meanwhile."""
+    with _serving(worlds.crowd(uavs)) as server, looking(browser, server.url, 320, 180) as page:
+        page.wait_for_timeout(1000 * _AGE_S)  # until the clocks are synchronized
+        factor, _ = pace(server, _AGE_S)
+        return {
+            f"age_p95_ms_{uavs}_uavs": shown_age_ms(page, _AGE_S),
+            f"real_time_factor_{uavs}_uavs": factor,
+        }
 
 
 def _forest(browser: Browser) -> dict[str, float]:

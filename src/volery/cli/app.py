@@ -25,7 +25,7 @@ from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand, ServeCommand
 from volery.cli.radio_commands import comms, gcs
-from volery.cli.study_commands import sweep
+from volery.cli.study_commands import judge, sweep
 from volery.cli.terminal import echo_lines
 
 app = typer.Typer(
@@ -68,6 +68,7 @@ app.command(cls=PageCommand)(run)
 app.command("list")(list_scenarios)
 app.command(context_settings={"ignore_unknown_options": True})(examples)
 app.command(cls=ServeCommand)(serve)
+app.command("test")(judge)
 for _command in (
     worker,
     play,

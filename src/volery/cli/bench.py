@@ -40,7 +40,8 @@ def measure_and_show(
             short = ", ".join(each for each, bench in BENCHES.items() if bench.has_quick)
             raise VoleryError(f"--quick is for one of these benches: {short}")
         if name == "all" and only:
-            raise VoleryError("--only is for one bench: learning")
+            whole = ", ".join(each for each, bench in BENCHES.items() if bench.has_parts)
+            raise VoleryError(f"--only is for one of these benches: {whole}")
         if name == "all":
             results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
         else:

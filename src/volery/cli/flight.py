@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volery.cli.error_reporting import USER_ERROR, complain, complain_of
-from volery.cli.flight_failures import FAILED, failures_of
+from volery.cli.flight_checks import FAILED, FlightChecks
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from volery.report.collect import FlightCollector
     from volery.runtime.simulation import Simulation
     from volery.scenario.changes import Changes
+    from volery.verdicts.verdict import Verdict
 
 _CONTACTS_SHOWN = 10
 
@@ -82,7 +84,7 @@ class RunOptions:
     wait_timeout_s: float = DEFAULT_TIMEOUT_S
     """Wall time within which they must connect."""
     fail_on: frozenset[str] = frozenset()
-    """Kinds of failures that the exit code reports; see `cli.flight_failures`."""
+    """Kinds of failures that the exit code reports; see `cli.flight_checks`."""
     workers: int | None = None
     """Workers among which the run is divided, besides the leader; None: it is not."""
     listen: str | None = None
@@ -116,6 +118,7 @@ class CommandLineFlight:
         self._log: LogWriter | None = None
         self._recorded: Subscription | None = None
         self._collector: FlightCollector | None = None
+        self._checks = FlightChecks(simulation, options.fail_on)
         if options.digest:
             simulation.diagnostics.enable_digest()
         if options.report is not None:
@@ -156,11 +159,14 @@ class CommandLineFlight:
             closed = self._close_log()
         self._progress.finish(self._simulation.time_s)
         self._tell_flight(problem)
+        verdicts = () if problem else self._checks.judge(self._wall_s)
+        for verdict in verdicts:
+            echo_line(f"  {verdict.outcome!s:7} {verdict.describe()}")
         if not closed and not code:
             code, problem = USER_ERROR, "The log could not be written"
-        report_written = self._write_report(problem)
+        report_written = self._write_report(problem, verdicts)
         code = code if report_written else code or USER_ERROR
-        failures = [] if code else failures_of(self._simulation, self._options.fail_on)
+        failures = [] if code else self._checks.failures()
         for line in failures:
             echo_line(f"failed: {line}", err=True)
         if not code and self._options.page is not None and not self._options.exit_at_end:
@@ -217,7 +223,7 @@ class CommandLineFlight:
             return False
         return True
 
-    def _write_report(self, interrupted: str) -> bool:
+    def _write_report(self, interrupted: str, verdicts: Sequence[Verdict]) -> bool:
         if self._collector is None or self._options.report is None:
             self._tell_files(None)
             return True
@@ -236,7 +242,8 @@ class CommandLineFlight:
                 machine=describe_machine(),
                 versions=describe_versions(),
             )
-            path = write_report(flight, self._options.report, overwrite=self._options.overwrite)
+            folder, overwrite = self._options.report, self._options.overwrite
+            path = write_report(flight, folder, verdicts=verdicts, overwrite=overwrite)
         except VoleryError as error:
             complain(str(error))
         self._progress.note("")

@@ -80,7 +80,7 @@ def run(
     Keys at a terminal: space pauses and resumes, . (or s) runs one physics step, + and - double
     and halve the real-time factor, m lifts it. Ctrl-C ends the run and writes log and report.
     """
-    from volery.cli.flight_failures import parse_failures
+    from volery.cli.flight_checks import parse_failures
     from volery.cli.run import RunOptions, fly, parse_speed
 
     if middleware == "zenoh" and not ros2:

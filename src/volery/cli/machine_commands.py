@@ -33,7 +33,7 @@ def bench(
         bool, typer.Option("--quick", help=f"Run the short version of {_QUICK}.")
     ] = False,
     only: Annotated[
-        str, typer.Option(help="Measure these parts of `learning`, separated by commas.")
+        str, typer.Option(help="Measure these parts of swarm or learning, separated by commas.")
     ] = "",
 ) -> None:
     """Measure how fast Volery is on this machine."""

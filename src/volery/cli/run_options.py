@@ -36,8 +36,9 @@ WaitTimeout = Annotated[
 FailOn = Annotated[
     list[str] | None,
     flight_option(
-        metavar="crash|contact[,..]",
-        help="Exit with 1 if a UAV has crashed at the end, or if one hit anything, repeatable.",
+        metavar="crash|contact|expectation[,..]",
+        help="Exit with 1 if a UAV has crashed at the end, if one hit anything, or if the scenario "
+        "expected something else, repeatable.",
     ),
 ]
 ReplayCommands = Annotated[

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -63,3 +63,85 @@ def sweep(
         command.record(log)
     else:
         command.fly(parse_part(part), retry_failed=retry_failed, report=report)
+
+
+@guarded
+def judge(
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(help="Scenario names (volery list), TOML files, or folders of them."),
+    ],
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=1, max=100_000, help="Fly this number of seeds; default: the scenario's."),
+    ] = None,
+    first_seed: Annotated[int, typer.Option(min=0, help="Set the first seed of --seeds.")] = 1,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=LOW:HIGH",
+            help="Draw a value of a key for each seed, such as wind=0:6, repeatable.",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Set the duration of the flights, simulated s.")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, max=1024, help="Set the number of processes; default: one per core."),
+    ] = None,
+    timeout: Annotated[
+        float | None, typer.Option(min=0.1, help="End a flight after this wall time, s.")
+    ] = None,
+    search: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=100_000,
+            metavar="N",
+            help="Search the values of --vary and --seeds for a failure, in N flights at most.",
+        ),
+    ] = None,
+    sampler: Annotated[
+        Literal["tpe", "random"], typer.Option(help="Set what proposes values for --search.")
+    ] = "tpe",
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the verdicts as JUnit XML.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the verdicts as JSON.")] = False,
+    out: Annotated[
+        Path, typer.Option(help="Set the folder for logs and scenarios of failed flights.")
+    ] = Path("runs/test"),
+    no_logs: Annotated[
+        bool, typer.Option("--no-logs", help="Do not repeat failed flights for their logs.")
+    ] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run code that the scenarios name: nodes, predicates.")
+    ] = False,
+    traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
+) -> None:
+    """Fly scenarios and judge the flights by their expectations.
+
+    Exit codes: 0 all flights passed, 1 some failed, 2 a test could not start.
+    """
+    from volery.cli.scenario_tests import TestOptions
+    from volery.cli.test_report import report_search, report_tests
+
+    options = TestOptions(
+        paths=tuple(scenarios),
+        seeds=seeds,
+        first_seed=first_seed,
+        jobs=jobs,
+        vary=tuple(vary or ()),
+        seconds=seconds,
+        timeout_s=timeout,
+        out=out,
+        keeps_logs=not no_logs,
+        trust=trust,
+    )
+    if search is None:
+        passed = report_tests(options, junit, as_json=as_json)
+    else:
+        passed = report_search(options, search, sampler, as_json=as_json)
+    if not passed:
+        raise typer.Exit(1)

@@ -12,7 +12,7 @@ from volery.cli.terminal import echo_line
 from volery.cli.trust import may_run_local_code
 from volery.cluster.errors import StudyError
 from volery.cluster.loading import LoadedStudy, load_study, read_study
-from volery.cluster.metric_names import is_local, metrics_of
+from volery.cluster.metric_names import metrics_of
 from volery.cluster.study_runs import TABLE_FILE, SweepOptions, fly_study, on_ray, stored_plan
 from volery.cluster.summary import point_rows
 from volery.cluster.table import StudyTable
@@ -133,14 +133,9 @@ class SweepCommand:
 
 
 def _loaded(path: Path, *, trust: bool) -> LoadedStudy:
-    """Loads a study; asks at a terminal whether code beside it may run."""
+    """Loads a study; asks at a terminal whether its own functions may run."""
     if not trust:
-        study, folder = read_study(path), path.parent.resolve()
-        entries = [entry for entry in metrics_of(study) if not entry.is_built_in]
-        own = {
-            entry.function.partition(":")[0]
-            for entry in entries
-            if is_local(entry.function, folder)
-        }
+        entries = [entry for entry in metrics_of(read_study(path)) if not entry.is_built_in]
+        own = {entry.function.partition(":")[0] for entry in entries}
         trust = may_run_local_code(path, sorted(own))
     return load_study(path, trust=trust)

@@ -15,9 +15,13 @@ _WORKERS_SHOWN = 16
 
 
 class StudyProgress:
-    """Shows finished and failed runs, the time left and what each worker does."""
+    """Shows finished and failed runs, the time left and what each worker does.
 
-    def __init__(self, name: str) -> None:
+    err: on stderr, for a command whose stdout is for programs.
+    """
+
+    def __init__(self, name: str, *, err: bool = False) -> None:
+        self._err = err
         self.flown = 0
         """Runs flown so far by this command."""
         self._name = name
@@ -26,10 +30,12 @@ class StudyProgress:
 
     def __enter__(self) -> StudyProgress:
         """Starts the display."""
-        if sys.stdout.isatty():
+        if (sys.stderr if self._err else sys.stdout).isatty():
+            from rich.console import Console
             from rich.live import Live
 
-            self._live = Live(transient=True, refresh_per_second=5)
+            console = Console(stderr=self._err)
+            self._live = Live(console=console, transient=True, refresh_per_second=5)
             self._live.start()
         return self
 
@@ -44,7 +50,7 @@ class StudyProgress:
             self._live.update(_panel(self._name, progress))
         elif time.monotonic() - self._shown_at > _PLAIN_PERIOD_S:
             self._shown_at = time.monotonic()
-            echo_line(f"{self._name}: {_words(progress)}")
+            echo_line(f"{self._name}: {_words(progress)}", err=self._err)
 
     def stop(self) -> None:
         """Removes the display; later output is printed below it."""

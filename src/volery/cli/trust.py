@@ -33,20 +33,32 @@ from volery.scenario.node_names import node_module
 
 
 def with_trust(options: RunOptions) -> RunOptions:
-    """Returns the options, with `trust` set if the nodes from the scenario's folder may run.
+    """Returns the options, with `trust` set if the code that the scenario names may run.
 
-    Raises `ScenarioError` if there are such nodes and they may not run.
+    Raises `ScenarioError` if there is such code and it may not run.
     """
-    if options.trust or not options.nodes or options.scenario in library.names():
+    if options.trust or options.scenario in library.names():
         return options
     file = Path(options.scenario)
     if not file.is_file():  # an unknown name, or that of a log's scenario
         return options
+    return replace(options, trust=may_run_code_of(file, nodes=options.nodes))
+
+
+def may_run_code_of(file: Path, *, nodes: bool = True) -> bool:
+    """Returns whether a scenario file names local nodes or predicates and the user trusts them.
+
+    nodes: whether its nodes start. Raises `ScenarioError` if they may not run.
+    """
+    from volery.scenario.expectations import PredicateExpectation
     from volery.scenario.load import load_scenario
 
     scenario = load_scenario(file)
-    nodes = [entry.node for entry in scenario.node_entries]
-    return replace(options, trust=may_run_local_nodes(file, nodes, scenario.access))
+    functions = [e.function for e in scenario.expect if isinstance(e, PredicateExpectation)]
+    modules = list(dict.fromkeys(function.partition(":")[0] for function in functions))
+    if nodes:
+        modules += _local_modules([e.node for e in scenario.node_entries], scenario.access)
+    return may_run_local_code(file, modules)
 
 
 def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess) -> bool:
@@ -54,11 +66,15 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
 
     Asks at a terminal if no answer is saved. Raises `ScenarioError` if they may not run.
     """
+    return may_run_local_code(file, _local_modules(nodes, access))
+
+
+def _local_modules(nodes: Iterable[str], access: ScenarioAccess) -> list[str]:
+    """Returns the modules of nodes that lie beside their scenario."""
     from volery.runtime.build.node_loading import is_local
 
     named = dict.fromkeys(node_module(node) for node in nodes)
-    modules = [module for module in named if module is not None and is_local(module, access)]
-    return may_run_local_code(file, modules)
+    return [module for module in named if module is not None and is_local(module, access)]
 
 
 def may_run_local_code(file: Path, modules: list[str]) -> bool:
@@ -72,12 +88,12 @@ def may_run_local_code(file: Path, modules: list[str]) -> bool:
         words = ", ".join(modules)
         if not at_terminal():
             raise ScenarioError(
-                f"{file}: runs code that lies beside it ({words}); give --trust if it is yours"
+                f"{file}: runs code of its own ({words}); give --trust if it is yours"
             )
-        echo_line(f"{file} runs code that lies beside it: {words}.", err=True)
+        echo_line(f"{file} runs code of its own: {words}.", err=True)
         echo_line("It can do whatever you can. Answer yes only if you know the code.", err=True)
         if not typer.confirm("Trust it from now on?", default=False, err=True):
-            raise ScenarioError(f"{file}: the code beside it ({words}) is not trusted")
+            raise ScenarioError(f"{file}: its own code ({words}) is not trusted")
         _remember(file, modules)
     return True
 

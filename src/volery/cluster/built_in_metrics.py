@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from volery.cluster.finished_run import Estimates
-from volery.core.arrays import Array
 from volery.core.errors import VoleryError
-from volery.report.alignment import at_times, ate_rmse_m, common_times
 from volery.results import FlightResult
+from volery.results.alignment import at_times, ate_rmse_m, common_times
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.battery import Battery, open_circuit_voltage
+from volery.verdicts.measures import area_m2
+from volery.verdicts.observing import Estimate, Estimates
+from volery.verdicts.verdict import Verdict
 
 _WH_POINTS = 201
-_CELL_M = 0.5
 _LEAST_POSES = 3
 
 
@@ -89,45 +89,21 @@ def ate_m(flight: FlightResult, estimates: Estimates) -> float:
         raise VoleryError(
             "metric 'ate_m': no UAV publishes slam/pose, slam/odom or odom; add a SLAM node"
         )
-    errors = [_ate(flight, name, *estimate) for name, estimate in estimates.items()]
+    errors = [_ate(flight, name, estimate) for name, estimate in estimates.items()]
     return float(np.nanmax(errors)) if np.isfinite(errors).any() else np.nan
 
 
-def _ate(flight: FlightResult, name: str, times_s: Array, position: Array) -> float:
-    inside = common_times(times_s, flight.times_s)
+def _ate(flight: FlightResult, name: str, estimate: Estimate) -> float:
+    inside = common_times(estimate.times_s, flight.times_s)
     if inside.sum() < _LEAST_POSES:
         return np.nan
-    truth = at_times(flight.times_s, flight[name].position_map, times_s[inside])
-    return ate_rmse_m(position[inside], truth)
+    truth = at_times(flight.times_s, flight[name].position_map, estimate.times_s[inside])
+    return ate_rmse_m(estimate.position[inside], truth)
 
 
-def area_m2(flight: FlightResult, radius_m: float = 2.0) -> float:
+def area(flight: FlightResult, radius_m: float = 2.0) -> float:
     """Returns the ground area, m2, within `radius_m` of any UAV's path, in cells of 0.5 m."""
-    cells = np.unique(np.concatenate([_cells(path) for path in flight.position_map]), axis=0)
-    if not len(cells):
-        return 0.0
-    reach = int(np.ceil(radius_m / _CELL_M))
-    offsets = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2), axis=-1).reshape(-1, 2)
-    offsets = offsets[np.linalg.norm(offsets, axis=1) * _CELL_M <= radius_m]
-    low = cells.min(axis=0) - reach
-    size = cells.max(axis=0) + reach + 1 - low
-    covered = np.zeros(size, np.bool_)
-    for offset in offsets:
-        x, y = (cells + offset - low).T
-        covered[x, y] = True
-    return float(covered.sum()) * _CELL_M**2
-
-
-def _cells(path: Array) -> Array:
-    """Returns the cells (C, 2) under a path (T, 3), without gaps."""
-    ground = path[np.isfinite(path).all(axis=1), :2]
-    if len(ground) < 2:
-        return np.floor(ground / _CELL_M).astype(np.int64)
-    lengths = np.linalg.norm(np.diff(ground, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    wanted = np.arange(0.0, along[-1] + _CELL_M, _CELL_M / 2.0)
-    dense = np.stack([np.interp(wanted, along, column) for column in ground.T], axis=1)
-    return np.floor(dense / _CELL_M).astype(np.int64)
+    return area_m2(flight.position_map, radius_m)
 
 
 def real_time_factor(flight: FlightResult, wall_s: float) -> float:
@@ -135,7 +111,18 @@ def real_time_factor(flight: FlightResult, wall_s: float) -> float:
     return flight.duration_s / wall_s if wall_s > 0.0 else np.nan
 
 
-FUNCTIONS: dict[str, Callable[..., float]] = {
+def expectations(verdicts: Sequence[Verdict]) -> dict[str, float]:
+    """Returns whether the flight passes all expectations, and the margin of each by its name.
+
+    Raises `VoleryError` for a scenario without expectations.
+    """
+    if not verdicts:
+        raise VoleryError("metric 'expectations': the scenario has no [[expect]]")
+    margins = {verdict.name: verdict.margin for verdict in verdicts}
+    return {"passed": float(all(verdict.is_passed for verdict in verdicts)), **margins}
+
+
+FUNCTIONS: dict[str, Callable[..., float | dict[str, float]]] = {
     "success": success,
     "collisions": collisions,
     "crashed": crashed,
@@ -146,7 +133,8 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     "separation_m": separation_m,
     "energy_wh": energy_wh,
     "ate_m": ate_m,
-    "area_m2": area_m2,
+    "area_m2": area,
     "real_time_factor": real_time_factor,
+    "expectations": expectations,
 }
 """Built-in metrics by name."""

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.cluster.finished_run import FinishedRun
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.results import FlightResult
 from volery.results.drawn_world import DrawnWorld
 from volery.runtime.vectorized_simulation import VectorizedSimulation
 from volery.scenario.schema import Scenario
+from volery.verdicts.finished_run import FinishedRun
 
 _COLUMNS = {"position_map": 3, "velocity_map": 3, "attitude": 4, "omega_body": 3}
 _BATTERY = sum(_COLUMNS.values())

@@ -43,6 +43,11 @@ class LoadedStudy:
         """Simulated time of a run, s."""
         return self.study.duration_s or self.scenario.duration_s
 
+    def seeds_of(self, point: Point) -> tuple[int, ...]:
+        """Returns the seeds of a point's runs: the study's, or the value of a parameter `seed`."""
+        own = next((v for n, v in point.items() if self.study.parameters[n].key == "seed"), None)
+        return self.study.all_seeds if own is None else (int(own),)
+
     def scenario_of(self, point: Point) -> Scenario:
         """Returns the scenario of a parameter point, with the scenario's own seed.
 

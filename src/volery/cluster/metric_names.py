@@ -29,6 +29,7 @@ BUILT_IN: dict[str, str] = {
     "ate_m": "high",
     "area_m2": "low",
     "real_time_factor": "low",
+    "expectations": "low",
 }
 """Built-in metrics, and which of their values are bad; docs/sweeps.md explains them."""
 UNREPEATABLE = ("real_time_factor",)
@@ -95,20 +96,11 @@ def _check_function(function: str, where: str, folder: Path, *, is_trusted: bool
     module = function.partition(":")[0]
     if source_of(function, folder) is None and module.endswith(".py"):
         raise StudyError(f"{where}: key 'metrics': {function}: no file {folder / module}")
-    if not is_trusted and is_local(function, folder):
+    if not is_trusted:
         raise StudyError(
-            f"{where}: runs code that lies beside it ({module}); give --trust if it is yours, or "
+            f"{where}: runs code of its own ({module}); give --trust if it is yours, or "
             "trust=True in Python"
         )
-
-
-def is_local(function: str, folder: Path) -> bool:
-    """Returns whether a function's code is in the folder of the study, not an installed module."""
-    module = function.partition(":")[0]
-    if module.endswith(".py"):
-        return True
-    top = module.partition(".")[0]
-    return PathFinder.find_spec(top) is None and _local_spec(top, folder) is not None
 
 
 def source_of(function: str, folder: Path) -> Path | None:

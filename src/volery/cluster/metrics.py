@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import inspect
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,21 +15,10 @@ import numpy as np
 
 from volery.cluster.built_in_metrics import FUNCTIONS
 from volery.cluster.errors import StudyError
-from volery.cluster.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of
 from volery.cluster.metric_names import MetricEntry, fingerprint_of
-
-GIVEN = (
-    "airframes",
-    "clearance",
-    "estimates",
-    "events",
-    "flight",
-    "log",
-    "scenario",
-    "simulation",
-    "wall_s",
-)
-"""Names of parameters that a metric's function may have."""
+from volery.core.errors import VoleryError
+from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of
+from volery.verdicts.user_functions import needs_of
 
 
 @dataclass(frozen=True)
@@ -71,18 +59,9 @@ def _load(entry: MetricEntry, folder: Path) -> Metric:
     function = FUNCTIONS[entry.function] if entry.is_built_in else _import(entry.function, folder)
     given = dict(entry.parameters)
     try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        raise StudyError(f"metric '{entry.name}': {entry.function} is not a function") from None
-    names = [p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
-    needs = tuple(name for name in names if name in GIVEN and name not in given)
-    required = {p.name for p in parameters if p.default is p.empty and p.name in names}
-    unknown = sorted(required - set(needs) - set(given)) or sorted(set(given) - set(names))
-    if unknown:
-        raise StudyError(
-            f"metric '{entry.name}': parameter '{unknown[0]}' of {entry.function} is neither one "
-            f"that a run gives ({', '.join(GIVEN)}) nor one with a value in the study"
-        )
+        needs = needs_of(function, given)
+    except VoleryError as error:
+        raise StudyError(f"metric '{entry.name}': {entry.function}: {error}") from None
     return Metric(entry, function, needs, fingerprint_of(entry, folder))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -26,6 +27,13 @@ class ResultsFolder:
         self._made: set[str] = set()
         self.make(path / "logs")
         self.make(path / "runs")
+
+    def clear(self) -> None:
+        """Removes all results and logs; for the driver that has locked the folder."""
+        self._made.clear()
+        for name in ("logs", "runs"):
+            shutil.rmtree(self.path / name, ignore_errors=True)
+            self.make(self.path / name)
 
     @property
     def logs(self) -> Path:

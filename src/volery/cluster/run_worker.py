@@ -14,7 +14,6 @@ from pathlib import Path
 from volery.cluster.batches import BatchResult, Preparation, RunBatch, StudyJob
 from volery.cluster.environment_flights import fly_environments, max_environments, obstacle
 from volery.cluster.errors import StudyError
-from volery.cluster.finished_run import FinishedRun, digest_of
 from volery.cluster.loading import LoadedStudy, scenario_of_study
 from volery.cluster.metric_names import metrics_of
 from volery.cluster.metrics import load_metrics
@@ -24,8 +23,12 @@ from volery.cluster.single_runs import SingleRun
 from volery.core.errors import VoleryError
 from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
+from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, digest_of
+from volery.verdicts.judging import Judge
 
 _DISK_FULL = os.strerror(errno.ENOSPC)
+_OF_SENSORS = {"simulation", "estimates", "topics"}
+"""Parts of a finished run that sensors make."""
 _TRIAL_S = 0.01
 """Simulated time flown before the first run, s."""
 
@@ -62,7 +65,10 @@ class RunWorker:
         scenario = scenario_of_study(study, job.where, job.folder, trust=job.is_trusted)
         self._loaded = LoadedStudy(study, job.where, job.folder, job.is_trusted, scenario, ())
         self._needs = {name for metric in self._metrics for name in metric.needs}
-        self._point: tuple[Point, Scenario, Scenario] | None = None
+        self._judges = "verdicts" in self._needs
+        if self._judges:
+            self._needs |= Judge(scenario).needs
+        self._point: tuple[Point, Scenario, Scenario, Judge | None] | None = None
 
     def prepare(self) -> Preparation:
         """Compiles what runs call, and flies the first parameter point for a moment."""
@@ -74,6 +80,8 @@ class RunWorker:
             return Preparation(code_version(), error=" ".join(str(error).split()))
         metric = next((m.entry.name for m in self._metrics if m.needs_simulation), None)
         reason = f"metric '{metric}' needs a simulation of its own" if metric else ""
+        if self._needs & set(NEEDS_SIMULATION) and not reason:
+            reason = "an expectation needs a simulation of its own"
         if self._study.logs == "all":
             reason = "all runs are recorded"
         most = max_environments(scenario, self._study.sample_rate_hz)
@@ -93,14 +101,14 @@ class RunWorker:
 
     # ------------------------------------------------------------------------------------- inside
 
-    def _scenarios(self, values: Point) -> tuple[Scenario, Scenario]:
-        """Returns the scenario of a point, and the same without sensors that nothing reads."""
+    def _scenarios(self, values: Point) -> tuple[Scenario, Scenario, Judge | None]:
+        """Returns a point's scenario, the same without idle sensors, and its judge."""
         if self._point is None or self._point[0] != values:
             scenario = self._loaded.scenario_of(values)
             lean = scenario
             if self._study.sensors == "needed" and _can_fly_without_sensors(scenario):
                 lean = scenario.with_({"types.*.sensors": []})
-            self._point = values, scenario, lean
+            self._point = values, scenario, lean, Judge(scenario) if self._judges else None
         return self._point[1:]
 
     def _fly_together(self, runs: Sequence[RunSpec]) -> list[RunResult] | None:
@@ -126,12 +134,11 @@ class RunWorker:
         log = self._job.results / f"{run.id}.partial.mcap" if needs_log else None
         kept = f"logs/{run.id}.mcap" if keeps_log else ""
         try:
-            scenario, lean = self._scenarios(run.values)
-            needs_sensors = batch.plain or needs_log or {"simulation", "estimates"} & self._needs
+            scenario, lean, _ = self._scenarios(run.values)
+            needs_sensors = batch.plain or needs_log or _OF_SENSORS & self._needs
             chosen = (scenario if needs_sensors else lean).model_copy(update={"seed": run.seed})
-            estimates = "estimates" in self._needs
             rate_hz = self._study.sample_rate_hz
-            with SingleRun(chosen, rate_hz, log, records_estimates=estimates) as flight:
+            with SingleRun(chosen, rate_hz, log, self._needs) as flight:
                 result = self._measured(run, flight.fly(), kept)
         except Exception as error:
             if _is_disk_full(error):
@@ -146,7 +153,10 @@ class RunWorker:
 
     def _measured(self, run: RunSpec, flown: FinishedRun, log: str) -> RunResult:
         values: dict[str, float] = {}
+        judge = self._scenarios(run.values)[2]
         try:
+            if judge is not None:
+                flown = replace(flown, verdicts=judge.verdicts(flown))
             for metric in self._metrics:
                 values.update(metric.values(flown))
         except Exception as error:
@@ -159,6 +169,7 @@ class RunWorker:
             version=code_version(),
             metrics=values,
             fingerprints={m.entry.name: m.fingerprint for m in self._metrics},
+            verdicts=[verdict.to_data() for verdict in flown.verdicts],
             digest=digest_of(flown.flight),
             simulated_s=flown.flight.duration_s,
             wall_s=flown.wall_s,

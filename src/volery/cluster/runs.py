@@ -19,6 +19,7 @@ from typing import Any
 from volery.cluster.loading import LoadedStudy
 from volery.cluster.points import Point
 from volery.scenario.file_names import named_files
+from volery.verdicts.verdict import Verdict
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _ID_DIGITS = 24
@@ -58,6 +59,8 @@ class RunResult:
     """Values by name; a metric that returns several has the names `metric.name`."""
     fingerprints: Mapping[str, str] = field(default_factory=dict)
     """Hashes of the metrics that were computed, by name."""
+    verdicts: Sequence[Mapping[str, Any]] = ()
+    """Verdicts on the expectations, as data of `Verdict`; empty: no metric reads them."""
     digest: str = ""
     """SHA-256 of the sampled states and the events."""
     simulated_s: float = 0.0
@@ -77,6 +80,12 @@ class RunResult:
     def is_failed(self) -> bool:
         """Whether the run failed."""
         return self.status == "failed"
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether the run has not failed, and passes the expectations that were judged."""
+        passed = all(Verdict.from_data(each).is_passed for each in self.verdicts)
+        return passed and not self.is_failed
 
     def to_json(self) -> str:
         """Returns the result as JSON."""
@@ -130,7 +139,7 @@ def runs_of(loaded: LoadedStudy, points: Sequence[int] | None = None) -> Iterato
     for number in range(len(loaded.points)) if points is None else points:
         values = loaded.points[number]
         content = point_hash(loaded, values)
-        for repetition, seed in enumerate(loaded.study.all_seeds):
+        for repetition, seed in enumerate(loaded.seeds_of(values)):
             identity = hashlib.sha256(f"{content} {seed}".encode()).hexdigest()[:_ID_DIGITS]
             yield RunSpec(identity, number, repetition, values, seed)
 

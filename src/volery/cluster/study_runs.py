@@ -45,6 +45,8 @@ class SweepOptions:
     """Makes the executor; None: processes on this machine."""
     on_progress: Callable[[SweepProgress], None] | None = None
     """Called about five times a second."""
+    reuses_results: bool = True
+    """Whether runs that have results are not flown again; else results and logs are removed."""
 
 
 def run_study(
@@ -93,19 +95,27 @@ def fly_study(loaded: LoadedStudy, options: SweepOptions) -> StudyTable:
     """
     arrow_module("`volery sweep`")
     folder = ResultsFolder(options.results)
-    runs = _part_of(loaded, list(runs_of(loaded)), options.part)
     with folder.locked(options.part):
-        prints = fingerprints_of(loaded)
-        known = folder.read_all(runs)
-        usable = {k: r for k, r in known.items() if _is_usable(r, prints, options.retry_failed)}
-        plan = RunPlan(runs, usable, loaded.study.stop)
+        plan = _plan_of(loaded, options, folder)
         try:
-            _fly_missing(loaded, options, plan, folder, prints)
+            _fly_missing(loaded, options, plan, folder)
         finally:
             table = table_of(loaded, plan, folder)
             if options.part is None:
                 folder.write_file(folder.path / TABLE_FILE, table.parquet())
     return table
+
+
+def fly_runs(loaded: LoadedStudy, options: SweepOptions) -> RunPlan:
+    """Flies the missing runs of a study and returns them with their results; writes no table.
+
+    Raises `StudyError` as `run_study`.
+    """
+    folder = ResultsFolder(options.results)
+    with folder.locked(options.part):
+        plan = _plan_of(loaded, options, folder)
+        _fly_missing(loaded, options, plan, folder)
+    return plan
 
 
 def table_of(loaded: LoadedStudy, plan: RunPlan, folder: ResultsFolder) -> StudyTable:
@@ -117,27 +127,30 @@ def table_of(loaded: LoadedStudy, plan: RunPlan, folder: ResultsFolder) -> Study
 
 def stored_plan(loaded: LoadedStudy, results: Path) -> RunPlan:
     """Returns the plan of a study with the results that its folder has; nothing is flown."""
-    folder, prints = ResultsFolder(results), fingerprints_of(loaded)
-    runs = list(runs_of(loaded))
-    known = folder.read_all(runs)
-    usable = {k: r for k, r in known.items() if _is_usable(r, prints, retry_failed=False)}
-    return RunPlan(runs, usable, loaded.study.stop)
+    return _plan_of(loaded, SweepOptions(results), ResultsFolder(results))
 
 
 # ------------------------------------------------------------------------------------------ inside
 
 
+def _plan_of(loaded: LoadedStudy, options: SweepOptions, folder: ResultsFolder) -> RunPlan:
+    """Returns the runs of a study, or of a part of it, with the results that exist."""
+    runs = _part_of(loaded, list(runs_of(loaded)), options.part)
+    if not options.reuses_results:
+        folder.clear()
+    prints, known = fingerprints_of(loaded), folder.read_all(runs)
+    usable = {k: r for k, r in known.items() if _is_usable(r, prints, options.retry_failed)}
+    return RunPlan(runs, usable, loaded.study.stop)
+
+
 def _fly_missing(
-    loaded: LoadedStudy,
-    options: SweepOptions,
-    plan: RunPlan,
-    folder: ResultsFolder,
-    prints: dict[str, str],
+    loaded: LoadedStudy, options: SweepOptions, plan: RunPlan, folder: ResultsFolder
 ) -> None:
     if not plan.has_missing and not _without_logs(loaded, options, plan, folder):
         return
     executor = executor_of(loaded, options, folder)
     try:
+        prints = fingerprints_of(loaded)
         driver = StudyDriver(loaded.study, plan, executor, folder, prints, options.on_progress)
         prepared = executor.prepare()
         if loaded.study.vectorized is True and prepared.obstacle:
@@ -223,7 +236,7 @@ def _without_logs(
 
 
 def _has_failed(result: RunResult) -> bool:
-    return result.is_failed or result.metrics.get("success") == 0.0
+    return not result.is_passed or result.metrics.get("success") == 0.0
 
 
 def worst_runs(loaded: LoadedStudy, plan: RunPlan, count: int | None = None) -> list[RunSpec]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from volery.control.fleet import Fleet
 from volery.control.setpoints import MAX_COORDINATE, checked
@@ -18,6 +18,7 @@ from volery.scenario.faults import (
     Fault,
     GnssFault,
     GustFault,
+    JammingFault,
     LastingFault,
     MotorFault,
     RadioFault,
@@ -29,6 +30,9 @@ from volery.vehicle.plant_types import RigidBody
 from volery.world.weather import Gust
 
 _log = logging.getLogger(__name__)
+
+_Actions: TypeAlias = tuple[Callable[[], Any], Callable[[], Any] | None]
+"""What begins a fault, and what ends it; None: it ends by itself."""
 
 
 class Radios(Protocol):
@@ -42,6 +46,12 @@ class Radios(Protocol):
 
     def restore_all(self, name: str) -> None:
         """Restores a radio."""
+
+    def check_jamming(self) -> None:
+        """Raises `CommandError` if jammers disturb no link."""
+
+    def jam(self, position_map: tuple[float, float, float], power_dbm: float, by: int) -> None:
+        """Adds (1) or removes (-1) a jammer at a position, m."""
 
 
 class _ActiveFault(NamedTuple):
@@ -88,7 +98,7 @@ class FaultPlan:
         that was deleted and spawned again as another type; otherwise the run ends.
         """
         begin, end = self._actions(fault)
-        uav = getattr(fault, "uav", None)
+        uav = uav_of(fault)
         self._planned += 1
         number = self._planned
 
@@ -114,7 +124,7 @@ class FaultPlan:
         _, end = self._actions(fault)
         if end is None:
             raise CommandError(f"fault: a {fault.kind} cannot be ended: it ends by itself")
-        uav = getattr(fault, "uav", None)
+        uav = uav_of(fault)
 
         def end_it() -> bool:
             return self._finish([one for one in self._active if _ends(fault, one.fault)][:1], end)
@@ -123,12 +133,12 @@ class FaultPlan:
 
     @property
     def active(self) -> tuple[LastingFault, ...]:
-        """Faults of present UAVs that have begun and not ended, oldest first.
+        """Faults of present UAVs, and of none, that have begun and not ended, oldest first.
 
         `at_s` is the time at which they began. Gusts and displacements are not among them.
         """
-        present = set(self._engine.names)
-        return tuple(one.fault for one in self._active if one.fault.uav in present)
+        present = {None, *self._engine.names}
+        return tuple(one.fault for one in self._active if uav_of(one.fault) in present)
 
     def _list(self, number: int, fault: LastingFault) -> None:
         if isinstance(fault, SensorFault):  # a sensor has one fault at a time
@@ -153,7 +163,7 @@ class FaultPlan:
         if self._radios is not None:
             self._radios.restore_all(uav)
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
-        self._active = tuple(one for one in self._active if one.fault.uav != uav)
+        self._active = tuple(one for one in self._active if uav_of(one.fault) != uav)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the active faults, for a snapshot; engine, fleet and sensors save the rest."""
@@ -193,21 +203,20 @@ class FaultPlan:
 
         self._engine.at(ns_from_s(time_s), act)
 
-    def _actions(self, fault: Fault) -> tuple[Callable[[], Any], Callable[[], Any] | None]:
+    def _actions(self, fault: Fault) -> _Actions:
         """Returns the actions that begin and end a fault; raises `CommandError` if impossible."""
-        if isinstance(fault, GustFault):
-            return self._gust(fault), None
-        if isinstance(fault, DisplacementFault):
-            return self._displacement(fault), None
-        if isinstance(fault, MotorFault):
-            return self._motor(fault)
-        if isinstance(fault, SensorFault):
-            return self._sensor(fault)
-        if isinstance(fault, RadioFault):
-            return self._radio(fault)
-        return self._gnss(fault)
+        by_kind: dict[str, Callable[[Any], _Actions]] = {
+            "motor": self._motor,
+            "sensor": self._sensor,
+            "gnss_loss": self._gnss,
+            "radio": self._radio,
+            "jamming": self._jamming,
+            "gust": self._gust,
+            "displacement": self._displacement,
+        }
+        return by_kind[fault.kind](fault)
 
-    def _motor(self, fault: MotorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    def _motor(self, fault: MotorFault) -> _Actions:
         i = self._row(fault.uav)
         rotors = len(self._fleet.airframes[i].rotors.places)
         if fault.rotor >= rotors:
@@ -233,17 +242,18 @@ class FaultPlan:
         sound = float(self._sound[uav][rotor])
         self._fleet.set_rotor_health(self._row(uav), rotor, share * sound)
 
-    def _sensor(self, fault: SensorFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    def _sensor(self, fault: SensorFault) -> _Actions:
         bank, row = self._find(fault.uav, fault.sensor)
+        value = fault.bias if fault.sigma is None else fault.sigma
         before = bank.faults.get_state()
         try:
-            bank.faults.set(row, fault.effect, fault.bias)  # raises now for an invalid bias
+            bank.faults.set(row, fault.effect, value)  # raises now for an invalid value
         finally:
             bank.faults.set_state(before)
 
         def fail() -> None:
             bank, row = self._find(fault.uav, fault.sensor)
-            bank.faults.set(row, fault.effect, fault.bias)
+            bank.faults.set(row, fault.effect, value)
 
         def mend() -> None:
             bank, row = self._find(fault.uav, fault.sensor)
@@ -251,14 +261,21 @@ class FaultPlan:
 
         return fail, mend
 
-    def _radio(self, fault: RadioFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    def _radio(self, fault: RadioFault) -> _Actions:
         radios = self._radios
         if radios is None:
             raise CommandError(f"{fault.uav} has no radio: the scenario has no [radio]")
         radios.check(fault.uav)
         return lambda: radios.silence(fault.uav, 1), lambda: radios.silence(fault.uav, -1)
 
-    def _gnss(self, fault: GnssFault) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    def _jamming(self, fault: JammingFault) -> _Actions:
+        radios, jammer = self._radios, (fault.position_m, fault.power_dbm)
+        if radios is None:
+            raise CommandError("there is no radio to jam: the scenario has no [radio]")
+        radios.check_jamming()
+        return lambda: radios.jam(*jammer, 1), lambda: radios.jam(*jammer, -1)
+
+    def _gnss(self, fault: GnssFault) -> _Actions:
         if not self._receivers(self._row(fault.uav)):
             raise CommandError(f"{fault.uav} has no GNSS receiver to lose its fix")
         since = ns_from_s(fault.at_s)
@@ -285,7 +302,7 @@ class FaultPlan:
         gnss = [bank for bank in inner if isinstance(bank, GnssBank)]
         return [bank for bank in gnss if any(s.uav == row for s in bank.sensors)]
 
-    def _gust(self, fault: GustFault) -> Callable[[], Any]:
+    def _gust(self, fault: GustFault) -> _Actions:
         def gust_at(start_s: float) -> Gust:
             end_s = start_s + 2.0 * fault.rise_s + fault.hold_s
             return Gust(fault.velocity_m_s, start_s, fault.rise_s, end_s)
@@ -294,9 +311,9 @@ class FaultPlan:
             gust_at(fault.at_s)  # raises now for an impossible gust
         except CommandError as error:
             raise CommandError(f"fault: gust: velocity_m_s: {error}") from None
-        return lambda: self._fleet.add_gust(gust_at(s_from_ns(self._engine.time_ns)))
+        return lambda: self._fleet.add_gust(gust_at(s_from_ns(self._engine.time_ns))), None
 
-    def _displacement(self, fault: DisplacementFault) -> Callable[[], Any]:
+    def _displacement(self, fault: DisplacementFault) -> _Actions:
         self._row(fault.uav)
         if ns_from_s(fault.at_s) <= self._engine.time_ns:
             self._check_displaced(fault)
@@ -307,7 +324,7 @@ class FaultPlan:
             self._check_displaced(fault)
             self._fleet.displace(self._row(fault.uav), fault.offset_m)
 
-        return displace
+        return displace, None
 
     def _check_displaced(self, fault: DisplacementFault) -> None:
         """Raises `CommandError` if a UAV would be displaced out of the world or into a solid."""
@@ -351,10 +368,18 @@ class FaultPlan:
         raise CommandError(f"{uav} has no sensor '{sensor}'; known: {', '.join(known)}")
 
 
+def uav_of(fault: Fault | LastingFault) -> str | None:
+    """Returns the UAV of a fault; None: it is of the air or the radio channel."""
+    uav: str | None = getattr(fault, "uav", None)
+    return uav
+
+
 def _ends(fault: Fault, active: LastingFault) -> bool:
     """Returns whether the end of `fault` ends an active one."""
-    if type(fault) is not type(active) or getattr(fault, "uav", None) != active.uav:
+    if type(fault) is not type(active) or uav_of(fault) != uav_of(active):
         return False
+    if isinstance(fault, JammingFault) and isinstance(active, JammingFault):
+        return (fault.position_m, fault.power_dbm) == (active.position_m, active.power_dbm)
     if isinstance(fault, SensorFault) and isinstance(active, SensorFault):
         return fault.sensor == active.sensor
     if isinstance(fault, MotorFault) and isinstance(active, MotorFault):

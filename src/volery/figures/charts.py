@@ -88,7 +88,7 @@ def _over_time(
     figure, axes = new_axes()
     many = len(flight.uavs) > _LEGEND_LIMIT
     for number, uav in enumerate(flight.uavs):
-        keep = _thinned(values(uav), lowest=lowest)
+        keep = thinned(values(uav), lowest=lowest)
         axes.plot(
             uav.time_s[keep],
             values(uav)[keep],
@@ -120,7 +120,7 @@ def _over_time(
     return as_svg(figure)
 
 
-def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
+def thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
     """Returns indices to draw: evenly spread, or the lowest value of every stretch."""
     if len(values) <= _POINTS:
         return np.arange(len(values))
@@ -132,9 +132,26 @@ def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
 
 def new_axes(width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Figure, Axes]:
     """Returns a figure, in inches, with axes in the style of the report."""
+    figure, (axes,) = new_panels(1, width, height)
+    return figure, axes
+
+
+def new_panels(
+    count: int, width: float, height: float, columns: int = 1
+) -> tuple[Figure, list[Axes]]:
+    """Returns a figure, in inches, with axes of one scale, row by row, in the report's style."""
     figure = Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
-    axes = figure.add_subplot()
+    rows = -(-count // columns)
+    panels: list[Axes] = []
+    for number in range(count):
+        shared = panels[0] if panels else None
+        panels.append(figure.add_subplot(rows, columns, number + 1, sharex=shared, sharey=shared))
+        _apply_style(panels[-1])
+    return figure, panels
+
+
+def _apply_style(axes: Axes) -> None:
     axes.patch.set_alpha(0.0)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
@@ -145,7 +162,6 @@ def new_axes(width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Figure, Ax
     axes.yaxis.label.set_color(FAINT)
     axes.grid(visible=True, color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-    return figure, axes
 
 
 def as_svg(figure: Figure) -> str:

@@ -12,11 +12,20 @@ class LazyList(Sequence[Any]):
     A message with hundreds of parts costs almost nothing until it is encoded, and a slow client
     drops most such messages. The parts are freed at once, whereas a permanent list of them would
     burden Python's garbage collector. `make` must always return equal parts.
+
+    `cdr` returns the CDR of a message whose only field is this list, where that is quicker than
+    encoding the parts.
     """
 
-    def __init__(self, count: int, make: Callable[[], Iterable[Any]]) -> None:
+    def __init__(
+        self,
+        count: int,
+        make: Callable[[], Iterable[Any]],
+        cdr: Callable[[], bytes] | None = None,
+    ) -> None:
         self._count = count
         self._make = make
+        self.cdr = cdr
 
     def __len__(self) -> int:
         return self._count

@@ -138,9 +138,7 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     (inner, inner_detail), size = detail
     length = size if kind == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:
-        is_shared = purpose is _CHECKED and not _holds(inner_detail)
-        looked_at = _copier(inner_detail, _LOOKED_AT if is_shared else purpose)
-        return partial(_copy_list, where, inner_detail, looked_at, is_shared)
+        return _parts_copier(where, inner_detail, purpose)
     if inner_detail[0] == "string":
         check = None if purpose is _RECEIVED else _base_checker(where, "string")
         return partial(_copy_list, where, "", check, False)
@@ -150,6 +148,15 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     copy = _look_at_numbers if purpose is _LOOKED_AT else numbers_of
     numbers = partial(copy, where, DTYPES[base], length)
     return (lambda values: numbers(with_sign(values))) if base == "byte" else numbers
+
+
+def _parts_copier(where: str, msgtype: str, purpose: _Purpose) -> Copy:
+    """Returns the function that copies a list of messages."""
+    if purpose is _RECEIVED:
+        return partial(_receive_list, _copier(msgtype, purpose))
+    is_shared = purpose is _CHECKED and not _holds(msgtype)
+    looked_at = _copier(msgtype, _LOOKED_AT if is_shared else purpose)
+    return partial(_copy_list, where, msgtype, looked_at, is_shared)
 
 
 def _base_checker(where: str, base: str) -> Copy:
@@ -255,6 +262,11 @@ def _copy_list(where: str, msgtype: str, copy: Copy | None, is_shared: bool, val
             raise _error_inside(item, msgtype, error) from None
         raise GraphError(f"{item}{str(error).removeprefix(where)}") from None
     return list(values) if is_shared else copied
+
+
+def _receive_list(copy: Copy, values: Any) -> list[Any]:
+    """Returns a list for one node, which may modify it and its parts, also of a `LazyList`."""
+    return list(map(copy, values))
 
 
 def _look_at_numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> None:

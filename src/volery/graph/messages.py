@@ -17,6 +17,7 @@ from rosbags.typesys.stores import ros2_jazzy as _ros2
 
 from volery.core.clock import NS_PER_S, stamp_from_ns
 from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.lazy_list import LazyList
 from volery.graph.typestore import typestore
 
 Time = _ros2.builtin_interfaces__msg__Time
@@ -149,6 +150,9 @@ class Published:
     @cached_property
     def cdr(self) -> bytes:
         """The message in CDR, the ROS 2 wire format."""
+        transforms = getattr(self.message, "transforms", None)
+        if isinstance(transforms, LazyList) and transforms.cdr is not None:
+            return transforms.cdr()
         return bytes(typestore().serialize_cdr(self.message, self.msgtype))
 
     @cached_property

@@ -47,6 +47,7 @@ from volery.publishing.camera_publishing import CameraPublisher
 from volery.publishing.lidar_publishing import LidarPublisher, laser_frame
 from volery.publishing.navigation_messages import NAVIGATION_TOPICS
 from volery.publishing.sensor_topics import SensorTopic
+from volery.publishing.transforms import transforms_of_odometry
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
@@ -222,22 +223,12 @@ class GraphPublisher:
     # ---------------------------------------------------------------------------------- by kind
 
     def _odometry(self, readings: OdometrySamples) -> None:
-        transforms = []
-        tf = self._tf.has_subscribers
-        for i in self._receiving_rows(readings.sensors, every=tf):
+        for i in self._receiving_rows(readings.sensors):
             sensor = readings.sensors[i]
             position = readings.position_odom[i].tolist()
             attitude = Quaternion(*readings.attitude[i].tolist())
             base = f"{sensor.uav_name}/base_link"
             frame = "map" if readings.is_ground_truth else f"{sensor.uav_name}/odom"
-            if tf and not readings.is_ground_truth:
-                transforms.append(
-                    TransformStamped(
-                        header(readings.stamp_ns, frame),
-                        base,
-                        Transform(Vector3(*position), attitude),
-                    )
-                )
             publisher = self._publishers[_odometry_topic(sensor)]
             if not publisher.has_subscribers:
                 continue
@@ -255,8 +246,10 @@ class GraphPublisher:
                     TwistWithCovariance(twist, _matrix(readings.twist_variance[i])),
                 )
             )
-        if transforms:
-            self._tf.publish(TFMessage(transforms))
+        if readings.sensors and not readings.is_ground_truth and self._tf.has_subscribers:
+            names = [sensor.uav_name for sensor in readings.sensors]
+            poses = np.hstack([readings.position_odom, readings.attitude])
+            self._tf.publish(transforms_of_odometry(readings.stamp_ns, names, poses))
 
     def _joints(self, joints: JointAngles) -> None:
         transforms = []

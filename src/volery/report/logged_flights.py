@@ -18,12 +18,13 @@ from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
+from volery.report.logged_teams import FLOCK, FORMATION, EnergyMeter, LoggedTeam, TeamLog
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
+from volery.verdicts.observing import ESTIMATES
 
 TRUTH = "ground_truth/odom"
-ESTIMATES = ("slam/pose", "slam/odom", "odom")
-"""Topics of a UAV's own pose estimate, in order of preference."""
+_BATTERY_TYPE = "sensor_msgs/msg/BatteryState"
 _SCAN_TYPE, _JOINTS_TYPE = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/JointState"
 _POSE_TYPES = (
     "nav_msgs/msg/Odometry",
@@ -46,6 +47,8 @@ class LoggedUav:
     """(T, 3) m, by the estimated poses; detected three times or more."""
     is_founded: bool
     """Whether nodding scans confirm that the trunks reach the ground; else by shape alone."""
+    energy_j: float = math.nan
+    """Energy that its battery supplied; NaN if not in the log."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,8 @@ class LoggedFlight:
     """The recorded scenario, if any."""
     problem: str = ""
     """Problem of the file: cut off, damaged chunks; empty for an intact one."""
+    team: LoggedTeam | None = None
+    """What the node of a formation or flock published, if any."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,9 @@ class _Log:
     """By topic."""
     surveys: dict[str, TrunkSurvey] = field(default_factory=dict)
     """By UAV."""
+    batteries: dict[str, EnergyMeter] = field(default_factory=dict)
+    """By UAV."""
+    team: TeamLog = field(default_factory=TeamLog)
     joints: StaticTransforms = field(default_factory=StaticTransforms)
     types: dict[str, str] = field(default_factory=dict)
     scenario: dict[str, Any] = field(default_factory=dict)
@@ -124,6 +132,11 @@ class _Log:
                 survey.add_scan(what, time_ns, decoder.decode(record).message)
         elif kind == _JOINTS_TYPE and what == "joint_states":
             self._survey(name).add_nods(decoder.decode(record).message)
+        elif kind == _BATTERY_TYPE and what == "battery":
+            meter = self.batteries.setdefault(name, EnergyMeter())
+            meter.add(time_ns, decoder.decode(record).message)
+        elif topic in (FORMATION, FLOCK):
+            self.team.add(topic, time_ns, decoder.decode(record).message)
         elif topic == "/tf_static":
             self.joints.add(decoder.decode(record).message)
         elif topic == "/volery/scenario":
@@ -145,9 +158,9 @@ class _Log:
         way = None if own is None else self.ways[own].way()
         survey = self.surveys.get(name, TrunkSurvey())
         trunks = np.zeros((0, 3)) if way is None else survey.trunks(way).seen_often
-        return LoggedUav(
-            name, None if truth is None else truth.way(), way, trunks, survey.is_founded
-        )
+        energy_j = self.batteries.get(name, EnergyMeter()).energy_j
+        true = None if truth is None else truth.way()
+        return LoggedUav(name, true, way, trunks, survey.is_founded, energy_j)
 
 
 def read_flight(path: Path) -> LoggedFlight:
@@ -163,7 +176,8 @@ def read_flight(path: Path) -> LoggedFlight:
         raise VoleryError(f"{path}: the log holds no UAV's poses (/NAME/{ESTIMATES[-1]}){what}")
     told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
     lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
-    return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.problem)
+    texts, team = (told["name"], told["description"]), log.team.team(log.scenario)
+    return LoggedFlight(uavs, *texts, lasts_s, log.origin, log.problem, team)
 
 
 def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:

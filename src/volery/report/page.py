@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from volery.core.whole_files import write_whole
 from volery.figures import charts, maps
 from volery.figures.flight_data import FlightData, UavTrack
 from volery.figures.palette import uav_color
+from volery.verdicts.verdict import Verdict
 
 _EVENTS_SHOWN = 60
 _STYLE = Path(__file__).with_name("report.css")
@@ -31,13 +32,19 @@ def check_target(folder: Path, *, overwrite: bool = False) -> None:
         raise ReportError(f"{path} exists; --overwrite replaces it")
 
 
-def write_report(flight: FlightData, folder: str | Path, *, overwrite: bool = False) -> Path:
+def write_report(
+    flight: FlightData,
+    folder: str | Path,
+    *,
+    verdicts: Sequence[Verdict] = (),
+    overwrite: bool = False,
+) -> Path:
     """Writes `index.html` into `folder` (created if missing) and returns its path.
 
-    The page appears whole or not at all. Raises `ReportError` if it cannot be written, or exists
-    and `overwrite` is not set.
+    verdicts: on the expectations of the scenario; they come first. The page appears whole or not at
+    all. Raises `ReportError` if it cannot be written, or exists and `overwrite` is not set.
     """
-    return write_page(page(flight), Path(folder), overwrite=overwrite)
+    return write_page(page(flight, verdicts), Path(folder), overwrite=overwrite)
 
 
 def write_page(text: str, folder: Path, *, overwrite: bool) -> Path:
@@ -54,7 +61,7 @@ def write_page(text: str, folder: Path, *, overwrite: bool) -> Path:
     return path
 
 
-def page(flight: FlightData) -> str:
+def page(flight: FlightData, verdicts: Sequence[Verdict] = ()) -> str:
     """Returns the whole page as text."""
     title = escape(flight.scenario)
     count = len(flight.uavs)
@@ -67,6 +74,7 @@ def page(flight: FlightData) -> str:
             f'<p class="lead">{escape(flight.description)}</p>' if flight.description else "",
             f'<p class="note">{escape(_ending(flight))}</p>' if flight.interrupted else "",
             "</header>",
+            _expectations(verdicts),
             _tiles(flight, fleet),
             *_figures(flight),
             _uav_table(flight),
@@ -95,10 +103,37 @@ def html_page(
     return "\n".join(part for part in (*head, *parts, "</main></body></html>") if part) + "\n"
 
 
+def chart_figure(svg: str, caption: str) -> str:
+    """Returns a chart with its <figcaption>."""
+    return f'<figure class="chart">{svg}{caption}</figure>'
+
+
 def _ending(flight: FlightData) -> str:
     return (
         f"{flight.interrupted}: this report shows the {flight.simulated_s:.1f} s flown "
         f"of {flight.planned_s:g} s."
+    )
+
+
+def _expectations(verdicts: Sequence[Verdict]) -> str:
+    """Returns a table of the verdicts; empty without any."""
+    rows = []
+    for verdict in verdicts:
+        moment = f"{verdict.time_s:.2f} s" if math.isfinite(verdict.time_s) else ""
+        margin = f"{verdict.margin:.3g} {verdict.unit}" if math.isfinite(verdict.margin) else ""
+        texts = (verdict.outcome, verdict.name, verdict.text, margin, verdict.uav, moment)
+        cells = "".join(f"<td>{escape(text)}</td>" for text in texts)
+        rows.append(f'<tr class="{verdict.outcome}">{cells}</tr>')
+    if not rows:
+        return ""
+    passed = sum(verdict.is_passed for verdict in verdicts)
+    head = "".join(
+        f"<th>{word}</th>" for word in ("verdict", "expectation", "measured", "margin", "UAV", "at")
+    )
+    return (
+        f"<h2>Expectations: {passed} of {len(verdicts)} passed</h2>"
+        f'<div class="scroll"><table class="verdicts"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
     )
 
 
@@ -135,7 +170,7 @@ def _figures(flight: FlightData) -> list[str]:
         return f'<figure class="map">{image}{caption(text)}</figure>'
 
     def chart(svg: str, text: str) -> str:
-        return f'<figure class="chart">{svg}{caption(text)}</figure>'
+        return chart_figure(svg, caption(text))
 
     trees = "Circles are tree crowns, the dots in them trunks, to scale. " if flight.trees else ""
     crosses = "Red crosses mark contacts. " if flight.contacts else ""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from volery.core.arrays import Array
+from volery.results.alignment import at_times
 
 _LONGEST_GAP_S = 0.5
 """Gap between poses above which there is no interpolation, s."""
@@ -39,6 +40,17 @@ class RecordedTrajectory:
     def length_m(self) -> float:
         """Horizontal length, m."""
         return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
+
+    def positions_at(self, wanted_s: Array) -> Array:
+        """Interpolates positions (M, 3) at times (M,); NaN outside of the poses and in gaps."""
+        found = np.full((len(wanted_s), 3), np.nan)
+        if len(self.time_s) < 2:
+            return found
+        after = np.clip(np.searchsorted(self.time_s, wanted_s), 1, len(self.time_s) - 1)
+        known = self.time_s[after] - self.time_s[after - 1] <= _LONGEST_GAP_S
+        known &= (wanted_s >= self.time_s[0]) & (wanted_s <= self.time_s[-1])
+        found[known] = at_times(self.time_s, self.position, wanted_s[known])
+        return found
 
     def pose_at(self, time_s: float) -> tuple[Array, Array] | None:
         """Interpolates position (3,) and attitude (4,) at a time; None outside of the poses."""

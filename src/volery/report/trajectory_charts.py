@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -58,7 +58,7 @@ def ways_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks)
 def over_time(lines: Sequence[ChartLine], axis: int) -> str:
     """Draws one coordinate of trajectories over time; axis 0 is x, 1 y, 2 z. Returns SVG."""
     figure, axes = new_axes()
-    start_s, clock = _clock_of(lines)
+    start_s, clock = clock_of(float(line.time_s[0]) for line in lines if len(line.time_s))
     for number, line in enumerate(lines):
         every = max(len(line.time_s) // _POINTS, 1)
         x, y = line.time_s[::every] - start_s, line.position[::every, axis]
@@ -79,12 +79,12 @@ def date_text(time_s: float) -> str:
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _clock_of(lines: Sequence[ChartLine]) -> tuple[float, str]:
-    """Returns the origin of the time axis, s, and its label."""
-    starts = [float(line.time_s[0]) for line in lines if len(line.time_s)]
-    if not starts or not is_date(min(starts)):
+def clock_of(starts_s: Iterable[float]) -> tuple[float, str]:
+    """Returns the origin of a time axis, s, for data that begin at these times, and its label."""
+    first_s = min(starts_s, default=0.0)
+    if not is_date(first_s):
         return 0.0, "time, s"
-    start_s = math.floor(min(starts))
+    start_s = math.floor(first_s)
     return float(start_s), f"time since {date_text(start_s)}, s"
 
 

@@ -12,16 +12,9 @@ import numpy as np
 from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
-from volery.report.alignment import (
-    TimeShift,
-    at_times,
-    ate_rmse_m,
-    common_times,
-    time_shift,
-    umeyama,
-)
 from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
-from volery.report.page import ReportError, check_target, html_page, write_page
+from volery.report.page import ReportError, chart_figure, check_target, html_page, write_page
+from volery.report.team_section import team_section
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trajectory_charts import (
     ChartLine,
@@ -31,6 +24,14 @@ from volery.report.trajectory_charts import (
     ways_from_above,
 )
 from volery.report.true_trunks import TrueTrunks, true_trunks
+from volery.results.alignment import (
+    TimeShift,
+    at_times,
+    ate_rmse_m,
+    common_times,
+    time_shift,
+    umeyama,
+)
 
 _LEAST = 10
 """Min number of common poses for an error."""
@@ -72,8 +73,8 @@ def write_log_report(
 
     compare: log of a real flight, drawn over that of `uav` (None: the first) in `log`, aligned in
     time by their speeds and in space by rotation and translation. compare_topic: its poses; None:
-    the only ones. Without compare, `uav` alone is drawn, None: all. Raises VoleryError for logs
-    without the requested data.
+    the only ones. Without compare, `uav` alone is drawn, None: all, and their team. Raises
+    VoleryError for logs without the requested data.
     """
     warnings, fit = list[str](), ""
     if compare is None and compare_topic is not None:
@@ -84,6 +85,7 @@ def write_log_report(
     drawn = flight.uavs if uav is None or compare is not None else [chosen]
     trunks = true_trunks(flight.origin, log.parent)
     parts = _problem_notes(log, flight.problem, warnings)
+    parts += team_section(flight) if uav is None else []
     parts += [section for each in drawn for section in _estimate_section(each, trunks)]
     if compare is not None:
         real = read_way(compare, compare_topic)
@@ -272,7 +274,7 @@ def _figures(
     lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks, caption: str
 ) -> list[str]:
     def figure(svg: str, text: str) -> str:
-        return f'<figure class="chart">{svg}<figcaption>{text}</figcaption></figure>'
+        return chart_figure(svg, f"<figcaption>{text}</figcaption>")
 
     return [
         figure(ways_from_above(lines, trunks, true), caption),

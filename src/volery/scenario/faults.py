@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from volery.core.errors import CommandError
-from volery.scenario.base import Data, Vector3
+from volery.scenario.base import Data, NonNegative, Vector3
 from volery.scenario.validation import describe_validation_error
 
 SimulatedTime = Annotated[float, Field(ge=0.0, le=1e8)]
@@ -27,8 +27,8 @@ class _UavFault(_Fault):
     """Name of the UAV, such as `uav1`."""
 
 
-class LastingFault(_UavFault):
-    """A fault of one UAV that lasts until it ends, or for good."""
+class LastingFault(_Fault):
+    """A fault that lasts until it ends, or for good."""
 
     until_s: SimulatedTime | None = None
     """Simulated time at which the fault ends; None: it is permanent."""
@@ -40,7 +40,7 @@ class LastingFault(_UavFault):
         return self
 
 
-class MotorFault(LastingFault):
+class MotorFault(LastingFault, _UavFault):
     """A rotor produces part of its thrust, or none."""
 
     kind: Literal["motor"] = "motor"
@@ -51,37 +51,52 @@ class MotorFault(LastingFault):
     """Remaining fraction of its thrust; 0 stops the rotor."""
 
 
-class SensorFault(LastingFault):
-    """A sensor sends nothing, repeats its last measurement, or has a bias."""
+class SensorFault(LastingFault, _UavFault):
+    """A sensor sends nothing, repeats its last measurement, has a bias or more noise."""
 
     kind: Literal["sensor"] = "sensor"
     """Fault of a sensor."""
     sensor: str
     """Name of the sensor, such as `imu`."""
-    effect: Literal["dropped", "stuck", "biased"]
-    """Effect: no samples, a repeated sample, or a bias."""
+    effect: Literal["dropped", "stuck", "biased", "noisy"]
+    """Effect: no samples, a repeated sample, a bias, or additional noise."""
     bias: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
     """Bias: a number for each measured component, in its unit."""
+    sigma: Annotated[tuple[NonNegative, ...], Field(min_length=1)] | None = None
+    """Standard deviation of additional Gaussian noise: a number for each measured component, in its
+    unit."""
 
     @model_validator(mode="after")
-    def _bias_belongs_to_biased(self) -> Self:
-        if (self.effect == "biased") != (self.bias is not None):
-            raise ValueError('bias is needed for effect = "biased", and only there')
+    def _numbers_belong_to_their_effects(self) -> Self:
+        for key, effect in (("bias", "biased"), ("sigma", "noisy")):
+            if (self.effect == effect) != (getattr(self, key) is not None):
+                raise ValueError(f'{key} is needed for effect = "{effect}", and only there')
         return self
 
 
-class GnssFault(LastingFault):
+class GnssFault(LastingFault, _UavFault):
     """No satellites are received."""
 
     kind: Literal["gnss_loss"] = "gnss_loss"
     """Loss of satellite signals."""
 
 
-class RadioFault(LastingFault):
+class RadioFault(LastingFault, _UavFault):
     """A UAV's radio neither sends nor receives."""
 
     kind: Literal["radio"] = "radio"
     """Loss of the radio."""
+
+
+class JammingFault(LastingFault):
+    """A transmitter covers the radios' channel with noise."""
+
+    kind: Literal["jamming"] = "jamming"
+    """A jammer."""
+    position_m: Vector3
+    """Position of the jammer, map."""
+    power_dbm: Annotated[float, Field(ge=-30.0, le=80.0)] = 30.0
+    """Power that it radiates in the channel's bandwidth, the same in all directions."""
 
 
 class GustFault(_Fault):
@@ -107,7 +122,13 @@ class DisplacementFault(_UavFault):
 
 
 Fault: TypeAlias = Annotated[
-    MotorFault | SensorFault | GnssFault | RadioFault | GustFault | DisplacementFault,
+    MotorFault
+    | SensorFault
+    | GnssFault
+    | RadioFault
+    | JammingFault
+    | GustFault
+    | DisplacementFault,
     Field(discriminator="kind"),
 ]
 
@@ -117,6 +138,7 @@ _KINDS: dict[Any, type[_Fault]] = {
     "sensor": SensorFault,
     "gnss_loss": GnssFault,
     "radio": RadioFault,
+    "jamming": JammingFault,
     "gust": GustFault,
     "displacement": DisplacementFault,
 }

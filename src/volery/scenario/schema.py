@@ -17,6 +17,7 @@ from volery.core.plurals import counted
 from volery.core.whole_files import write_whole
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.base import Data, Name, renamed
+from volery.scenario.expectations import Expectation
 from volery.scenario.faults import Fault
 from volery.scenario.file_names import moved
 from volery.scenario.python_changes import split_changes, with_keys, with_short_forms
@@ -104,6 +105,8 @@ class Scenario(Data):
     """Nodes of the whole system, one of each; their relative names start at the root."""
     faults: tuple[Fault, ...] = ()
     """Faults at set times."""
+    expect: tuple[Expectation, ...] = ()
+    """What a flight is expected to do; `volery test` and `volery.verdicts` judge it."""
     message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
@@ -167,6 +170,14 @@ class Scenario(Data):
             data = with_short_forms(changed.data(), short, where)
             changed = validated(data, Scenario, where)
         return changed.with_access(self.access)
+
+    def expecting(self, kind: str, **keys: Any) -> Scenario:
+        """Returns a copy with one more expectation: `expecting("separation", at_least_m=2.0)`.
+
+        The keys are those of the expectation in a file. Raises `ScenarioError`, naming key and
+        allowed values, for invalid ones.
+        """
+        return self.with_(expect=[*self.data().get("expect", ()), {"kind": kind, **keys}])
 
     def data(self) -> dict[str, Any]:
         """Returns the given keys as plain data: tables, lists, numbers, texts and dates."""

@@ -1,7 +1,8 @@
 """Samples of sensors, as batches: one object for all S sensors of a bank at one time.
 
 Row i of every array belongs to `sensors[i]`. Arrays are new, owned by the sample and read-only.
-`MEASURED` names the quantities that a bias acts on, and the numbers that a sensor's bias has.
+`MEASURED` names the quantities that faults add a bias or noise to, and the numbers that a sensor's
+bias has.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from planar_bench import (
 
 from volery.autonomy.slam.planar_node import PlanarSlam
 from volery.core.errors import NodeError
-from volery.report.alignment import ate_rmse_m
+from volery.results.alignment import ate_rmse_m
 
 TOPIC, MS = "/uav1/laser/horizontal/scan", S // 1000
 

@@ -253,7 +253,7 @@ def test_metrics_of_the_user_may_raise_and_return_several_numbers(tmp_path):
     ("metric", "words"),
     [
         ("mine.py:gone", "has no function 'gone'"),
-        ("mine.py:sizes", "parameter 'factor' of mine.py:sizes"),
+        ("mine.py:sizes", "mine.py:sizes: its parameter 'factor'"),
         ("broken.py:f", "broken.py cannot be imported: SyntaxError"),
     ],
 )

@@ -68,7 +68,7 @@ def test_code_beside_the_study_needs_trust(tmp_path):
     (tmp_path / "mine.py").write_text("def drift(flight): return 0.0\n")
     for metric in ("mine.py:drift", "mine:drift"):
         path = study_file(tmp_path, f"metrics = ['{metric}']")
-        with pytest.raises(StudyError, match=r"runs code that lies beside it .*--trust"):
+        with pytest.raises(StudyError, match=r"runs code of its own .*--trust"):
             load_study(path)
         assert load_study(path, trust=True).study.metrics == (metric,)
 

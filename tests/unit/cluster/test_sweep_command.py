@@ -56,7 +56,7 @@ def test_code_beside_the_study_is_not_run_without_trust(tmp_path):
     path = study_file(tmp_path, "metrics = ['mine.py:drift']\n")
     done = sweep(path, "--out", tmp_path / "out")
     assert done.exit_code == 2
-    assert "runs code that lies beside it (mine.py); give --trust if it is yours" in done.stderr
+    assert "runs code of its own (mine.py); give --trust if it is yours" in done.stderr
 
 
 def test_an_interrupted_study_says_how_to_continue(tmp_path, monkeypatch):

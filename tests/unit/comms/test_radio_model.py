@@ -9,7 +9,7 @@ import pytest
 
 from volery.comms.addresses import ALL
 from volery.comms.protocol import StationFrame, StationFrameKind, StationFrameParser, encode_frame
-from volery.comms.radio.channel import RadioChannel
+from volery.comms.radio.channel import Jammer, RadioChannel
 from volery.comms.radio.path_loss import (
     Paths,
     distance_loss_db,
@@ -139,6 +139,50 @@ def test_foliage_shortens_the_reach() -> None:
     assert clear.snr_db(0, 0, 1) - wood.snr_db(0, 0, 1) == pytest.approx(loss)
     assert loss > 10.0
     assert clear.snr_db(0, 0, 7) == -math.inf
+
+
+def test_a_jammer_adds_its_power_to_the_noise_of_each_receiver() -> None:
+    """Two stations 60 m apart, a jammer 10 m from the second: it loses frames, the first none."""
+    radio = Radio(shadowing_db=0.0)
+    places = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
+    link = link_of(radio, places)
+    clear = link.snr_db(0, 0, 1)
+    jammer = Jammer((70.0, 0.0, 5.0), 30.0)
+    link.jam(jammer)
+
+    def dbm(power: float, gains: float, distance: float) -> float:
+        return power + gains - float(distance_loss_db(radio, np.array([distance]))[0])
+
+    # far above the noise of the receiver, only the jammer's power counts: 20 dBm against 30
+    expected = dbm(20.0, 4.0, 60.0) - dbm(30.0, 2.0, 10.0)
+    assert link.snr_db(0, 0, 1) == pytest.approx(expected, abs=0.01)
+    at_first = dbm(20.0, 4.0, 60.0) - dbm(30.0, 2.0, 70.0)
+    assert link.snr_db(0, 1, 0) == pytest.approx(at_first, abs=0.01)
+    assert link(0, 0, 1, frame_of(1)).lost
+    link.jam(jammer)  # twice the power: 3 dB
+    assert link.snr_db(0, 0, 1) == pytest.approx(expected - 3.01, abs=0.01)
+    kept = link.get_state()
+    link.end_jamming(jammer)
+    link.end_jamming(jammer)
+    link.end_jamming(jammer)  # no such one
+    assert link.snr_db(0, 0, 1) == clear
+    assert not link(0, 0, 1, frame_of(2)).lost
+    link.set_state(kept)
+    assert link.snr_db(0, 0, 1) == pytest.approx(expected - 3.01, abs=0.01)
+
+
+def test_a_weak_or_distant_jammer_changes_little_and_foliage_shields_from_it() -> None:
+    radio = Radio(shadowing_db=0.0)
+    places = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
+    far, near, wood = link_of(radio, places), link_of(radio, places), link_of(radio, places, 60.0)
+    clear, clear_wood = near.snr_db(0, 0, 1), wood.snr_db(0, 0, 1)
+    far.jam(Jammer((100_000.0, 0.0, 5.0), 0.0))
+    assert clear - far.snr_db(0, 0, 1) == pytest.approx(0.0, abs=0.01)
+    for link in (near, wood):
+        link.jam(Jammer((80.0, 0.0, 5.0), 30.0))
+    loss = foliage_loss_db(radio, np.array([60.0]))[0]
+    lost, lost_in_wood = clear - near.snr_db(0, 0, 1), clear_wood - wood.snr_db(0, 0, 1)
+    assert lost - lost_in_wood == pytest.approx(loss, abs=0.05)
 
 
 def test_a_kept_state_is_not_touched_by_what_follows() -> None:

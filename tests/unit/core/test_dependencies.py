@@ -20,6 +20,7 @@ FROM_ELSEWHERE = {
     **dict.fromkeys(("rclpy", "sensor_msgs"), "a sourced ROS"),
     "netifaces": "a sourced ROS 1, which works without it",
     "tensordict": "rsl-rl, which its users install themselves",
+    "pytest": "the pytest that loads the plugin",
     **dict.fromkeys(
         ("PyFlyt", "crazyflow", "jax", "multiRobotPathPlanner", "pybullet"),
         "environments of their own, made for `volery bench peers`",

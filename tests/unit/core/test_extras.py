@@ -150,6 +150,12 @@ def hypercubes():
     draw([], StudySampling(method="latin_hypercube", samples=2))
 
 
+def searches():
+    from volery.cluster.failure_search import TpeSampler
+
+    TpeSampler(1, 1)
+
+
 def cluster():
     from volery.cluster.ray_worker import ray_pool
 
@@ -186,6 +192,7 @@ USES = [
     ("pyarrow", "pyarrow", "sweep", tables_of_runs),
     ("scipy.special", "scipy", "sweep", intervals),
     ("scipy.stats", "scipy", "sweep", hypercubes),
+    ("optuna", "optuna", "search", searches),
     ("ray", "ray", "cluster", cluster),
     ("playwright.sync_api", "playwright", "bench", browser),
 ]

@@ -5,7 +5,9 @@ import pickle
 from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.lazy_list import LazyList
+from volery.graph.message_copies import receive_message
 from volery.graph.messages import (
+    Published,
     Quaternion,
     TFMessage,
     Transform,
@@ -51,3 +53,23 @@ def test_they_read_like_a_list_and_are_not_made_before():
     kept = pickle.loads(pickle.dumps(rows))
     assert type(kept) is list
     assert rows == kept
+
+
+def test_a_node_receives_a_list_of_its_own():
+    made = list(parts())
+    message = TFMessage(LazyList(3, lambda: made))
+    first, second = receive_message(message), receive_message(message)
+    first.transforms[0].child_frame_id = "changed"
+    first.transforms.append(made[0])
+    assert second.transforms == made
+    assert made[0].child_frame_id == "uav0/base_link"
+
+
+def test_cdr_of_the_whole_needs_no_parts():
+    def make():
+        raise AssertionError("the parts are not needed")
+
+    message = TFMessage(LazyList(3, make, lambda: b"cdr"))
+    assert Published("/tf", TYPE, 0, message).cdr == b"cdr"
+    plain = Published("/tf", TYPE, 0, TFMessage(list(parts()))).cdr
+    assert Published("/tf", TYPE, 0, TFMessage(LazyList(3, parts))).cdr == plain

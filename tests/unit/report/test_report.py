@@ -17,6 +17,7 @@ from volery.figures import charts, maps
 from volery.figures.flight_data import FlightData, Ground
 from volery.report.page import ReportError, page, write_report
 from volery.report.voxels import VoxelSet
+from volery.verdicts import Outcome, Verdict
 
 PNG = b"\x89PNG\r\n\x1a\n"
 VOID = {"meta", "img", "br", "hr", "link"}
@@ -100,6 +101,17 @@ def test_charts_take_the_pages_colours(flight: FlightData, draw: object) -> None
     assert "#0102" not in svg
     assert re.match(r"<svg[^>]*viewBox", svg)
     assert not re.match(r"<svg[^>]*\swidth=", svg)
+
+
+def test_verdicts_come_before_the_figures(light: FlightData) -> None:
+    calm = Verdict("calm", "speed", Outcome.PASSED, "2.10 m/s", 0.9, "m/s", 3.25, "uav2")
+    near = Verdict("<near>", "separation", Outcome.FAILED, "none", math.nan)
+    text = page(light, [calm, near])
+    assert text.index("Expectations: 1 of 2 passed") < text.index("flown by")
+    assert "&lt;near&gt;" in text
+    cells = "".join(f"<td>{c}</td>" for c in ("passed", "calm", "2.10 m/s", "0.9 m/s", "uav2"))
+    assert f'<tr class="passed">{cells}<td>3.25 s</td>' in text
+    assert "Expectations" not in page(light)
 
 
 def test_interrupted_flight_says_so(light: FlightData) -> None:

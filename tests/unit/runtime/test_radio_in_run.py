@@ -100,6 +100,62 @@ def test_a_lost_radio_neither_sends_nor_hears() -> None:
             simulation.faults.inject({"kind": "radio", "uav": "uav4"})
 
 
+JAMMER = {"kind": "jamming", "position_m": [75.0, 0.0, 5.0], "power_dbm": 20.0}
+"""15 m beyond the last of three UAVs in a row, 30 m apart."""
+
+
+def test_a_jammer_silences_the_radios_near_it_for_others() -> None:
+    with Simulation(scenario_of(shadowing_db=0.0)) as simulation:
+        simulation.faults.inject({**JAMMER, "at_s": 1.05, "until_s": 2.05})
+        simulation.run(1.5)
+        (fault,) = simulation.faults.active
+        assert fault.kind == "jamming"
+        assert "jamming" in repr(simulation.faults)
+        simulation.vehicles.reset("uav1")  # it is of no UAV
+        assert simulation.faults.active == (fault,)
+        kept = simulation.snapshot()
+        for _ in range(2):
+            simulation.run(1.5)
+            during = [[name for t, name in heard(simulation, row) if 1.05e9 < t < 2.05e9]
+                      for row in (0, 2)]  # fmt: skip
+            assert during[1] == []  # the jammer is nearer to it than the others
+            assert set(during[0]) == {"/uav2", "/uav3"}
+            after = [name for t, name in heard(simulation, 2) if t > 2.05e9]
+            assert set(after) == {"/uav1", "/uav2"}
+            assert simulation.faults.active == ()
+            simulation.restore(kept)
+
+
+def test_a_jammer_is_ended_by_what_describes_it_and_by_a_reset() -> None:
+    with Simulation(scenario_of(shadowing_db=0.0)) as simulation:
+        simulation.faults.inject(JAMMER)
+        simulation.run(1.0)
+        assert heard(simulation, 2) == []
+        simulation.faults.end({**JAMMER, "power_dbm": 21.0})  # another one
+        simulation.run(0.5)
+        assert heard(simulation, 2) == []
+        simulation.faults.end(JAMMER)
+        simulation.run(0.5)
+        assert heard(simulation, 2) != []
+        simulation.faults.inject(JAMMER)
+        simulation.run(0.5)
+        simulation.reset()
+        simulation.run(0.5)
+        assert simulation.faults.active == ()
+        assert heard(simulation, 2) != []
+
+
+def test_jamming_needs_radios_whose_links_are_modelled() -> None:
+    ideal, modelled = scenario_of(links="ideal"), scenario_of()
+    far = {**JAMMER, "position_m": [0.0, 0.0, 1e7]}
+    for scenario, fault, words in (
+        (ideal, JAMMER, 'links = "ideal" know no noise'),
+        (modelled, far, "position_m"),
+    ):
+        with Simulation(scenario) as simulation, pytest.raises(CommandError, match=words):
+            simulation.faults.inject(fault)
+
+
 def test_a_snapshot_holds_what_is_on_the_air() -> None:
     with Simulation(scenario_of(latency_s=0.03, power_dbm=-18.0)) as simulation:
         simulation.diagnostics.enable_digest()

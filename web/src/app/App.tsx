@@ -11,6 +11,7 @@ import { Rail } from "./Rail.tsx";
 import { SceneBoundary } from "./SceneBoundary.tsx";
 import { Situation } from "./Situation.tsx";
 import { ReturnsLegend } from "./ReturnsLegend.tsx";
+import { UavLegend } from "./UavLegend.tsx";
 import { TopBar } from "./top/TopBar.tsx";
 import { useHotkeys } from "./useHotkeys.ts";
 
@@ -49,7 +50,10 @@ function Overlays() {
   const shown = useLayout((layout) => layout.shown);
   return (
     <div className="overlays">
-      <ReturnsLegend />
+      <div className="legends">
+        <UavLegend />
+        <ReturnsLegend />
+      </div>
       <Suspense>
         {shown.map && <MiniMap />}
         {shown.pictures && <Cameras />}

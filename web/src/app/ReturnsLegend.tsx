@@ -23,7 +23,7 @@ export function ReturnsLegend() {
   );
   if (!seen || kinds.length === 0) return null;
   return (
-    <div className="returns-legend" role="note" aria-label="Colours of LIDAR returns">
+    <div className="legend" role="note" aria-label="Colours of LIDAR returns">
       {kinds.map((kind) => (
         <Entry key={kind} kind={kind} />
       ))}
@@ -53,7 +53,7 @@ function Dot({ colour, text }: { colour: Bytes; text: string }) {
   return (
     <span>
       <span
-        className="returns-dot"
+        className="legend-dot"
         style={{ background: `color(srgb-linear ${linear})` }}
         aria-hidden
       />

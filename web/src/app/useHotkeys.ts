@@ -8,6 +8,7 @@ import {
   sendCommand,
   type FlightCommand,
 } from "../link/commands.ts";
+import { commandAll, commandText } from "../state/commanding.ts";
 import { toggleControls } from "../state/flying.ts";
 import { toggleOverlay } from "../state/layout.ts";
 import { attempt, showFailure } from "../state/notices.ts";
@@ -15,7 +16,7 @@ import { goByClick } from "../state/goals.ts";
 import { whyNotNow } from "../state/rights.ts";
 import { useSimulation } from "../state/simulation.ts";
 import { givePosition, setMoving, useTool } from "../state/tool.ts";
-import { select, useVehicles } from "../state/vehicles.ts";
+import { allSelected, select, useVehicles } from "../state/vehicles.ts";
 import { openWindow, useWindows } from "../state/windows.ts";
 
 /** Keys that change the simulation; others only the page. */
@@ -28,7 +29,7 @@ const COMMANDS: Readonly<Record<string, () => void>> = {
   h: () => order("hold"),
   l: () => order("land"),
   b: () => order("return_home"),
-  g: () => void goByClick(useVehicles.getState().selected),
+  g: () => void goByClick(allSelected()),
   c: toggleControls,
   v: () => setMoving(!useTool.getState().moving),
 };
@@ -40,8 +41,10 @@ const PAGE: Readonly<Record<string, () => void>> = {
   p: () => toggleOverlay("pictures"),
   "?": () => openWindow("help"),
   Escape: () => {
+    const { selected, group } = useVehicles.getState();
     if (useTool.getState().asking !== null) givePosition(null);
-    else setMoving(false);
+    else if (useTool.getState().moving) setMoving(false);
+    else if (group.length > 0) select(selected);
   },
 };
 
@@ -61,8 +64,9 @@ export function useHotkeys(): void {
       if (whyNot === null) run();
       else showFailure("Command unavailable", whyNot);
     };
-    window.addEventListener("keydown", press);
-    return () => window.removeEventListener("keydown", press);
+    // Not at the window: a tooltip that Escape closes lets no event pass beyond the document.
+    document.addEventListener("keydown", press);
+    return () => document.removeEventListener("keydown", press);
   }, []);
 }
 
@@ -80,8 +84,8 @@ function command(what: string, asked: Promise<unknown>): void {
 }
 
 function order(what: FlightCommand): void {
-  const { selected } = useVehicles.getState();
-  if (selected !== "") command(selected, sendCommand(selected, what));
+  const uavs = allSelected();
+  if (uavs.length > 0) void commandAll(commandText(what), uavs, (uav) => sendCommand(uav, what));
 }
 
 function pace(up: boolean): void {

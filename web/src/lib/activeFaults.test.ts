@@ -14,4 +14,6 @@ test("a fault says in words what is wrong", () => {
   );
   expect(faultText({ ...of, kind: "sensor", sensor: "imu", effect: "stuck" })).toBe("imu stuck");
   expect(faultText({ ...of, kind: "gnss_loss" })).toBe("no GNSS");
+  const jammer = { kind: "jamming", at_s: 0, position_m: [60.4, -2, 5], power_dbm: 30 };
+  expect(faultText(jammer)).toBe("radio jammed with 30 dBm from (60, -2, 5) m");
 });

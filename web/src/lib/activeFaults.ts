@@ -1,7 +1,8 @@
 /** A fault that has begun and not ended, as in a scenario. */
 export interface ActiveFault {
   kind: string;
-  uav: string;
+  /** Without it, the fault is of no UAV. */
+  uav?: string;
   /** Simulated times, s; without the second it stays. */
   at_s: number;
   until_s?: number;
@@ -10,6 +11,9 @@ export interface ActiveFault {
   sensor?: string;
   effect?: string;
   bias?: number[];
+  sigma?: number[];
+  position_m?: number[];
+  power_dbm?: number;
 }
 
 export function activeFaultsOf(text: string): ActiveFault[] {
@@ -32,6 +36,10 @@ export function faultText(fault: ActiveFault): string {
       return "no GNSS";
     case "radio":
       return "no radio";
+    case "jamming": {
+      const at = (fault.position_m ?? []).map((metres) => metres.toFixed(0)).join(", ");
+      return `radio jammed with ${fault.power_dbm} dBm from (${at}) m`;
+    }
     default:
       return fault.kind;
   }

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { join, numberOf, stepsOf, valueAt } from "./fieldPath.ts";
+import { join, numberOf, pathsIn, stepsOf, valueAt } from "./fieldPath.ts";
 
 const ODOMETRY = { pose: { pose: { position: { x: 1, z: 2.5 } } }, ranges: Float32Array.of(4, 5) };
 
@@ -20,6 +20,16 @@ describe("a path of fields", () => {
     expect(valueAt(ODOMETRY, stepsOf("ranges[1]"))).toBe(5);
     expect(valueAt(ODOMETRY, stepsOf("pose.twist.x"))).toBeUndefined();
     expect(valueAt(null, stepsOf("x"))).toBeUndefined();
+  });
+
+  it("leads into JSON", () => {
+    const status = { data: '{"cost": 0.25, "parts": {"upwash": 3}, "ranks": [[7, 8]], "a.b": 1}' };
+    expect(valueAt(status, stepsOf("data.cost"))).toBe(0.25);
+    expect(valueAt(status, stepsOf("data.ranks[0][1]"))).toBe(8);
+    expect(valueAt({ data: "{broken" }, stepsOf("data.cost"))).toBeUndefined();
+    expect(valueAt({ data: "text" }, stepsOf("data.length"))).toBeUndefined();
+    expect(pathsIn(status)).toEqual(["data.cost", "data.parts.upwash", "data.ranks[0][0]"]);
+    expect(pathsIn({ data: "none" })).toEqual([]);
   });
 
   it("gives a number where there is one", () => {

@@ -19,6 +19,10 @@ export class Restarts {
     this.open.set(uav, { stampS, sinceMs: NaN });
   }
 
+  get isEmpty(): boolean {
+    return this.open.size === 0;
+  }
+
   /** Whether a UAV is on the way to its start; `poseS` is the stamp of the newest poses. */
   includes(uav: string, poseS: number, nowMs: number): boolean {
     const restart = this.open.get(uav);

@@ -1,5 +1,7 @@
 import type { geometry_msgs_TransformStamped } from "../messages/generated.ts";
+import type { Transforms } from "../lib/cdrTransforms.ts";
 import { compose, identity, type Pose } from "../lib/pose.ts";
+import { secondsOf } from "../lib/time.ts";
 import { POSE, type FrameNames } from "./protocol.ts";
 
 const DEEPEST = 32;
@@ -15,51 +17,48 @@ export class FrameTree {
   version = 0;
   private readonly moving = new Map<string, Edge>();
   private readonly fixed = new Map<string, Edge>();
-  /** Places told straight in the map by the simulation; they win over estimates. */
-  private readonly true_ = new Map<string, Pose>();
+  /** Rows in `truePoses` of places told straight in the map by the simulation; they win over estimates. */
+  private trueRows = new Map<string, number>();
+  private truePoses: Float64Array = new Float64Array(0);
 
-  move(transforms: readonly geometry_msgs_TransformStamped[]): void {
-    for (const t of transforms) {
-      const child = bare(t.child_frame_id);
-      if (!this.moving.has(child) && !this.true_.has(child)) this.version++;
-      this.moving.set(child, { parent: bare(t.header.frame_id), pose: poseOf(t) });
+  move({ parents, children, poses }: Transforms): void {
+    for (let i = 0; i < children.length; i++) {
+      const child = bare(children[i]!);
+      if (!this.moving.has(child) && !this.trueRows.has(child)) this.version++;
+      this.moving.set(child, { parent: bare(parents[i]!), pose: poseAt(poses, i) });
     }
   }
 
-  fix(transforms: readonly geometry_msgs_TransformStamped[]): void {
-    for (const t of transforms) {
-      this.fixed.set(bare(t.child_frame_id), { parent: bare(t.header.frame_id), pose: poseOf(t) });
-    }
+  fix({ parents, children, poses }: Transforms): void {
+    children.forEach((child, i) =>
+      this.fixed.set(bare(child), { parent: bare(parents[i]!), pose: poseAt(poses, i) }),
+    );
     this.version++;
   }
 
   /** Take one message with the true places of everything; what it lacks is gone. */
-  moveTruly(transforms: readonly geometry_msgs_TransformStamped[]): void {
-    const told = new Set<string>();
-    for (const t of transforms) {
-      const child = bare(t.child_frame_id);
-      told.add(child);
-      if (!this.true_.has(child)) this.version++;
-      this.true_.set(child, poseOf(t));
+  moveTruly({ children, poses }: Transforms): void {
+    this.truePoses = poses;
+    const before = this.trueRows;
+    const same =
+      before.size === children.length && children.every((name, i) => before.get(bare(name)) === i);
+    if (same) return;
+    this.trueRows = new Map(children.map((name, i) => [bare(name), i]));
+    for (const name of before.keys()) {
+      if (!this.trueRows.has(name)) this.moving.delete(name);
     }
-    if (told.size === this.true_.size) return;
-    for (const name of this.true_.keys()) {
-      if (told.has(name)) continue;
-      this.true_.delete(name);
-      this.moving.delete(name);
-      this.version++;
-    }
+    this.version++;
   }
 
   forget(): void {
     this.moving.clear();
     this.fixed.clear();
-    this.true_.clear();
+    this.trueRows = new Map();
     this.version++;
   }
 
   names(): FrameNames {
-    const names = new Set([...this.true_.keys(), ...this.moving.keys()]);
+    const names = new Set([...this.trueRows.keys(), ...this.moving.keys()]);
     const fixed = [...this.fixed].map(([child, { parent, pose }]) => ({
       child,
       parent,
@@ -72,6 +71,11 @@ export class FrameTree {
   rows(names: readonly string[]): Float64Array<ArrayBuffer> {
     const rows = new Float64Array(names.length * POSE);
     names.forEach((name, i) => {
+      const row = this.trueRows.get(name);
+      if (row !== undefined) {
+        for (let k = 0; k < POSE; k++) rows[i * POSE + k] = this.truePoses[row * POSE + k]!;
+        return;
+      }
       const pose = this.inMap(name, 0);
       if (pose === null) rows.fill(NaN, i * POSE, (i + 1) * POSE);
       else rows.set(pose, i * POSE);
@@ -80,8 +84,8 @@ export class FrameTree {
   }
 
   private inMap(frame: string, depth: number): Pose | null {
-    const known = this.true_.get(frame);
-    if (known !== undefined) return known;
+    const row = this.trueRows.get(frame);
+    if (row !== undefined) return poseAt(this.truePoses, row);
     if (frame === "map" || frame === "world") return identity();
     const edge = this.moving.get(frame) ?? this.fixed.get(frame);
     // A robot without a map shows itself in the topmost frame that it has.
@@ -96,7 +100,23 @@ function bare(name: string): string {
   return name.startsWith("/") ? name.slice(1) : name;
 }
 
-function poseOf(t: geometry_msgs_TransformStamped): Pose {
-  const { translation: p, rotation: q } = t.transform;
+function poseAt(poses: Float64Array, row: number): Pose {
+  const p = poses;
+  const at = row * POSE;
+  return [p[at]!, p[at + 1]!, p[at + 2]!, p[at + 3]!, p[at + 4]!, p[at + 5]!, p[at + 6]!];
+}
+
+/** Transforms that came as objects. */
+export function transformsOf(list: readonly geometry_msgs_TransformStamped[]): Transforms {
+  const [first] = list;
+  return {
+    stampS: first === undefined ? NaN : secondsOf(first.header.stamp),
+    parents: list.map(({ header }) => header.frame_id),
+    children: list.map((each) => each.child_frame_id),
+    poses: Float64Array.from(list.flatMap(poseOf)),
+  };
+}
+
+function poseOf({ transform: { translation: p, rotation: q } }: geometry_msgs_TransformStamped) {
   return [p.x, p.y, p.z, q.x, q.y, q.z, q.w];
 }

@@ -3,8 +3,8 @@
 
 import { Ros, Service, Topic } from "roslib";
 import type { geometry_msgs_TransformStamped } from "../messages/generated.ts";
-import { secondsOf } from "../lib/time.ts";
-import { FrameTree } from "./frameTree.ts";
+import { readTransforms, type Transforms } from "../lib/cdrTransforms.ts";
+import { FrameTree, transformsOf } from "./frameTree.ts";
 import type { FromWorker, ToWorker, Wish } from "./protocol.ts";
 import { Streams } from "./streams.ts";
 import { MeteredTransport } from "./transport.ts";
@@ -13,6 +13,11 @@ const FIRST_RETRY_MS = 250;
 const LONGEST_RETRY_MS = 500;
 const TRAFFIC_MS = 500;
 const POLICY_VIOLATION = 1008;
+
+/** What the server's own encoding of a message looks like. */
+interface RawMessage {
+  bytes: Uint8Array;
+}
 
 interface TransformMessage {
   transforms: geometry_msgs_TransformStamped[];
@@ -131,12 +136,12 @@ function subscribe(id: number, wish: Wish): void {
   );
 }
 
-function make(wish: Wish): Topic {
+function make(wish: Wish, compression = "cbor"): Topic {
   return new Topic({
     ros: ros!,
     name: wish.topic,
     messageType: wish.type,
-    compression: "cbor",
+    compression,
     throttle_rate: wish.throttleMs,
     queue_length: wish.depth,
     reconnect_on_close: false, // subscribed anew with the next connection, see `connect`
@@ -187,40 +192,46 @@ function followFrames(): void {
   if (follow === null) return;
   const type = "tf2_msgs/msg/TFMessage";
   const { throttleMs, truth } = follow;
-  const listen = (topic: string, throttle: number, take: (m: TransformMessage) => void) => {
+  const listen = (topic: string, throttle: number, take: (transforms: Transforms) => void) => {
     // Several publish on /tf, each a part of the tree: none of them may be throttled away.
-    const made = make({ topic, type, throttleMs: throttle, depth: throttle > 0 ? 1 : 100 });
-    made.subscribe((message) => take(message as TransformMessage));
+    const wish = { topic, type, throttleMs: throttle, depth: throttle > 0 ? 1 : 100 };
+    // A simulation sends CDR; the own encoding of a robot may be that of ROS 1.
+    const made = truth ? make(wish, "cbor-raw") : make(wish);
+    made.subscribe((message) =>
+      take(
+        truth
+          ? readTransforms((message as RawMessage).bytes)
+          : transformsOf((message as TransformMessage).transforms),
+      ),
+    );
     frameTopics.push(made);
   };
-  listen("/tf_static", 0, (message) => {
-    tree.fix(message.transforms);
-    tellPoses(message);
+  listen("/tf_static", 0, (transforms) => {
+    tree.fix(transforms);
+    tellPoses(transforms);
   });
-  listen("/tf", 0, (message) => {
-    tree.move(message.transforms);
-    if (!truthHeard) tellPoses(message);
+  listen("/tf", 0, (transforms) => {
+    tree.move(transforms);
+    if (!truthHeard) tellPoses(transforms);
   });
   truthHeard = false; // a recording may lack it
   if (!truth) return;
-  listen("/ground_truth/tf", throttleMs, (message) => {
+  listen("/ground_truth/tf", throttleMs, (transforms) => {
     truthHeard = true;
-    tree.moveTruly(message.transforms);
-    tellPoses(message);
+    tree.moveTruly(transforms);
+    tellPoses(transforms);
   });
 }
 
-function tellPoses(message: TransformMessage): void {
+function tellPoses({ stampS }: Transforms): void {
   if (tree.version !== toldVersion) {
     toldVersion = tree.version;
     const told = tree.names();
     names = told.names;
     tell({ kind: "frames", ...told });
   }
-  const first = message.transforms[0];
-  if (first === undefined) return;
+  if (Number.isNaN(stampS)) return;
   const poses = tree.rows(names);
-  const stampS = secondsOf(first.header.stamp);
   self.postMessage({ kind: "poses", poses, stampS, arrivedMs: nowMs() } satisfies FromWorker, {
     transfer: [poses.buffer],
   });

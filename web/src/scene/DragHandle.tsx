@@ -123,6 +123,7 @@ function useDragging(
     const ray = (event: PointerEvent) => rayAt(canvas, camera, event.clientX, event.clientY);
     const down = (event: PointerEvent) => {
       if (event.target !== canvas || event.button !== 0 || group.current === null) return;
+      if (event.ctrlKey || event.metaKey) return; // a box begins
       const grip = gripAt(caster, canvas, camera, group.current, event);
       if (grip === null) return;
       event.stopPropagation();

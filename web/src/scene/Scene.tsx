@@ -2,6 +2,7 @@ import { Canvas, useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useRef } from "react";
 import { NeutralToneMapping, Object3D, PCFShadowMap, type PerspectiveCamera } from "three";
 import { ViewMenu } from "../views/ViewMenu.tsx";
+import { BoxSelection } from "./BoxSelection.tsx";
 import { DragHandle } from "./DragHandle.tsx";
 import { EyeProbe } from "./EyeProbe.tsx";
 import { GroundPicker } from "./GroundPicker.tsx";
@@ -27,6 +28,7 @@ export function Scene() {
         aria-label="Scene"
       >
         <Cameras />
+        <BoxSelection />
         <DragHandle />
         <EyeProbe />
         <GroundPicker />

@@ -3,10 +3,13 @@
 import { goTo, publishGoal, type Position } from "../link/commands/flight.ts";
 import { create } from "zustand";
 import { link } from "../link/link.ts";
+import { counted } from "../lib/counted.ts";
+import { shifted } from "../lib/formation.ts";
 import { eulerOf } from "../lib/pose.ts";
 import { useConnection } from "./connection.ts";
 import { useEpoch } from "./epoch.ts";
-import { attempt, succeeds } from "./notices.ts";
+import { commandAll } from "./commanding.ts";
+import { attempt } from "./notices.ts";
 import { useRestart } from "./restarts.ts";
 import { pickPosition } from "./tool.ts";
 import { baseFrame } from "./vehicles.ts";
@@ -31,7 +34,7 @@ const LEAST_HEIGHT_M = 1.5;
 export async function sendTo(uav: string, place: Position): Promise<void> {
   useGoals.setState({ [uav]: place });
   if (useConnection.getState().volery) {
-    await succeeds(`${uav}: go to`, goTo(uav, place, null));
+    await goTo(uav, place, null);
     return;
   }
   const pose = link.frames.pose(baseFrame(uav));
@@ -39,16 +42,30 @@ export async function sendTo(uav: string, place: Position): Promise<void> {
   publishGoal(uav, place, yaw);
 }
 
+/** Fly UAVs to above a place of the ground; several keep their places to one another. */
+export async function sendAllAbove(
+  uavs: readonly string[],
+  ground: { x: number; y: number },
+): Promise<void> {
+  const goals = shifted(new Map(uavs.map((uav) => [uav, positionOf(uav)])), ground);
+  await commandAll("go to", uavs, (uav) => sendAbove(uav, goals.get(uav)!));
+}
+
 /** Fly to above a place of the ground at the present height, or higher where the ground is. */
-export async function sendAbove(uav: string, ground: { x: number; y: number }): Promise<void> {
-  const present = link.frames.pose(baseFrame(uav))?.[2] ?? 0;
-  const z = Math.max(present, heightAt(ground.x, ground.y) + LEAST_HEIGHT_M);
+async function sendAbove(uav: string, ground: { x: number; y: number }): Promise<void> {
+  const z = Math.max(positionOf(uav).z, heightAt(ground.x, ground.y) + LEAST_HEIGHT_M);
   await sendTo(uav, { ...ground, z });
 }
 
-/** Let the user click on where a UAV is to fly. */
-export async function goByClick(uav: string): Promise<void> {
-  if (uav === "") return;
-  const place = await attempt("Go to", pickPosition(`Goal of ${uav}`));
-  if (place !== null) await sendAbove(uav, place);
+/** Let the user click on where UAVs are to fly; several keep their places to one another. */
+export async function goByClick(uavs: readonly string[]): Promise<void> {
+  if (uavs.length === 0) return;
+  const what = uavs.length === 1 ? uavs[0]! : counted(uavs.length, "UAV");
+  const place = await attempt("Go to", pickPosition(`Goal of ${what}`));
+  if (place !== null) await sendAllAbove(uavs, place);
+}
+
+function positionOf(uav: string): Position {
+  const [x, y, z] = link.frames.pose(baseFrame(uav)) ?? [0, 0, 0];
+  return { x, y, z };
 }

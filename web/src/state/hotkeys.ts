@@ -23,6 +23,10 @@ export const HOTKEYS: readonly HotkeyGroup[] = [
     title: "UAVs",
     keys: [
       { keys: ["[", "]"], text: "Select the previous, the next UAV" },
+      {
+        keys: ["Ctrl", "drag"],
+        text: "Select the UAVs in a box; Ctrl and a click: one more or less",
+      },
       { keys: ["T"], text: "Take off" },
       { keys: ["H"], text: "Hold position" },
       { keys: ["L"], text: "Land" },

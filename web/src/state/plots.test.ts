@@ -1,6 +1,7 @@
 // @vitest-environment happy-dom
 import { beforeEach, expect, it } from "vitest";
 import {
+  addDistancePlot,
   addXYPlot,
   curveName,
   drawCurves,
@@ -8,6 +9,7 @@ import {
   hasEqualScales,
   linesOf,
   removeCurve,
+  setDistances,
   setEqualScales,
   usePlots,
   type Curve,
@@ -35,6 +37,20 @@ it("a plot of positions has equal scales unless one is told otherwise", () => {
   expect(hasEqualScales(last())).toBe(false);
   setEqualScales(2, true);
   expect(hasEqualScales(last())).toBe(true);
+});
+
+it("a plot of distances has no lines, takes an empty plot's place, and keeps its own", () => {
+  usePlots.setState({ plots: [{ id: 1, lines: [] }] });
+  addDistancePlot();
+  const distances = { id: 1, kind: "distances", of: "nearest" };
+  expect(usePlots.getState().plots).toEqual([distances]);
+  setDistances(1, "pairs");
+  addXYPlot([]);
+  expect(usePlots.getState().plots[0]).toEqual({ ...distances, of: "pairs" });
+  expect(linesOf(usePlots.getState().plots[0]!)).toEqual([]);
+  drawLine(height, 1); // nothing can be drawn there
+  drawLine(height);
+  expect(usePlots.getState().plots.map(({ kind }) => kind)).toEqual(["distances", "xy", undefined]);
 });
 
 it("a curve is drawn once, and its numbers are received once", () => {

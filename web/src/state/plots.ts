@@ -21,7 +21,15 @@ export interface XYPlot {
   equal: boolean | null;
 }
 
-export type Plot = TimePlot | XYPlot;
+/** How the distances between UAVs are distributed at a moment. */
+export interface DistancePlot {
+  id: number;
+  kind: "distances";
+  /** Of each UAV to the nearest one, or of all pairs. */
+  of: "nearest" | "pairs";
+}
+
+export type Plot = TimePlot | XYPlot | DistancePlot;
 
 interface Plots {
   plots: Plot[];
@@ -56,6 +64,7 @@ function splitPath(path: string): [string, string] {
 
 /** Everything that a plot shows, each number once. */
 export function linesOf(plot: Plot): Line[] {
+  if (plot.kind === "distances") return [];
   if (plot.kind !== "xy") return plot.lines;
   const lines = plot.curves.flatMap(({ x, y }) => [x, y]);
   return [...new Map(lines.map((line) => [nameOf(line), line])).values()];
@@ -69,11 +78,10 @@ export function hasEqualScales({ equal, curves }: XYPlot): boolean {
 
 /** Draw a line in a plot, or in the last one that is over time. */
 export function drawLine(line: Line, plot?: number): void {
-  const isOverTime = (one: Plot) => one.kind !== "xy";
   if (plot === undefined && !usePlots.getState().plots.some(isOverTime)) addPlot();
   const id = plot ?? usePlots.getState().plots.findLast(isOverTime)!.id;
   change(id, (one) =>
-    one.kind === "xy" || one.lines.some((other) => nameOf(other) === nameOf(line))
+    !isOverTime(one) || one.lines.some((other) => nameOf(other) === nameOf(line))
       ? one
       : { ...one, lines: [...one.lines, line] },
   );
@@ -81,9 +89,9 @@ export function drawLine(line: Line, plot?: number): void {
 
 export function removeLine(plot: number, line: Line): void {
   change(plot, (one) =>
-    one.kind === "xy"
-      ? one
-      : { ...one, lines: one.lines.filter((other) => nameOf(other) !== nameOf(line)) },
+    isOverTime(one)
+      ? { ...one, lines: one.lines.filter((other) => nameOf(other) !== nameOf(line)) }
+      : one,
   );
 }
 
@@ -116,14 +124,21 @@ export function setEqualScales(plot: number, equal: boolean): void {
   change(plot, (one) => (one.kind === "xy" ? { ...one, equal } : one));
 }
 
+export function setDistances(plot: number, of: DistancePlot["of"]): void {
+  change(plot, (one) => (one.kind === "distances" ? { ...one, of } : one));
+}
+
+export function addDistancePlot(): void {
+  addInstead((id) => ({ id, kind: "distances", of: "nearest" }));
+}
+
 export function addPlot(): void {
   add((id) => ({ id, lines: [] }));
 }
 
-/** A plot of numbers over numbers, with these curves to begin with; it takes an empty one's place. */
+/** A plot of numbers over numbers, with these curves to begin with. */
 export function addXYPlot(curves: Curve[]): void {
-  usePlots.setState(({ plots }) => ({ plots: plots.filter((one) => linesOf(one).length > 0) }));
-  add((id) => ({ id, kind: "xy", curves, equal: null }));
+  addInstead((id) => ({ id, kind: "xy", curves, equal: null }));
 }
 
 export function removePlot(id: number): void {
@@ -132,6 +147,18 @@ export function removePlot(id: number): void {
 
 export function setWindow(windowS: number): void {
   usePlots.setState({ windowS });
+}
+
+function isOverTime(plot: Plot): plot is TimePlot {
+  return plot.kind === undefined || plot.kind === "time";
+}
+
+/** Add a plot, which takes the place of empty ones. */
+function addInstead(made: (id: number) => Plot): void {
+  usePlots.setState(({ plots }) => ({
+    plots: plots.filter((one) => one.kind === "distances" || linesOf(one).length > 0),
+  }));
+  add(made);
 }
 
 function add(made: (id: number) => Plot): void {

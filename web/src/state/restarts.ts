@@ -16,7 +16,7 @@ const SERVICE = "/volery/reset_uav";
 
 /** Whether a UAV has no trail now, since it is put back to its start. */
 export function isRestarting(uav: string): boolean {
-  return restarts.includes(uav, link.frames.stampS, performance.now());
+  return !restarts.isEmpty && restarts.includes(uav, link.frames.stampS, performance.now());
 }
 
 export function followRestarts(): void {
@@ -31,9 +31,11 @@ export function followRestarts(): void {
   );
   // Repairs of which there is no record, such as those of a node in the simulation.
   useVehicles.subscribe(({ list }, before) => {
-    const crashed = before.list.filter((vehicle) => vehicle.crashed).map(({ name }) => name);
+    const wrecks = before.list.filter((vehicle) => vehicle.crashed);
+    if (list === before.list || wrecks.length === 0) return;
+    const crashed = new Set(wrecks.map(({ name }) => name));
     for (const { name, crashed: still } of list)
-      if (!still && crashed.includes(name)) note(name, link.frames.stampS);
+      if (!still && crashed.has(name)) note(name, link.frames.stampS);
   });
   useEpoch.subscribe(() => restarts.clear());
 }

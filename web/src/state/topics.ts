@@ -2,19 +2,24 @@ import { create } from "zustand";
 import { topics, type TopicName } from "../link/commands/graph.ts";
 import { link } from "../link/link.ts";
 
-/** Topics of the graph; asked for every few seconds while somebody looks at them. */
+/** Topics of the graph by name; asked for every few seconds while somebody looks at them. */
 export const useTopics = create<{ list: TopicName[] }>(() => ({ list: [] }));
 
 const ASK_MS = 3000;
+/** `uav2` before `uav10`; made once, since a large fleet has ten thousand topics. */
+const ORDER = new Intl.Collator("en", { numeric: true });
 
 export function followTopics(): void {
   let asking = false;
+  let before: readonly TopicName[] = [];
   const ask = async () => {
     if (asking || link.state !== "open" || document.hidden) return;
     asking = true;
     const list = await topics().catch(() => null);
     asking = false;
-    if (list !== null && changed(list, useTopics.getState().list)) useTopics.setState({ list });
+    if (list === null || !changed(list, before)) return;
+    before = list;
+    useTopics.setState({ list: list.toSorted((a, b) => ORDER.compare(a.name, b.name)) });
   };
   link.watch(() => void ask());
   setInterval(() => void ask(), ASK_MS);

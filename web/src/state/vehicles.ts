@@ -1,4 +1,5 @@
 import { create } from "zustand";
+import { useShallow } from "zustand/react/shallow";
 import { link } from "../link/link.ts";
 import type { volery_interfaces_VehicleState as VehicleState } from "../messages/generated.ts";
 
@@ -7,9 +8,16 @@ interface Vehicles {
   list: VehicleState[];
   /** Name of the selected UAV; empty: none. */
   selected: string;
+  /** Names of UAVs that are selected together, `selected` among them; empty, or two and more. */
+  group: readonly string[];
 }
 
-export const useVehicles = create<Vehicles>(() => ({ list: [], selected: "" }));
+export const useVehicles = create<Vehicles>(() => ({ list: [], selected: "", group: [] }));
+
+/** Names of all UAVs: the same array until another UAV is among them. */
+export function useVehicleNames(): string[] {
+  return useVehicles(useShallow(({ list }) => list.map(({ name }) => name)));
+}
 
 const BASE = "/base_link";
 const ROBOTS_MS = 500;
@@ -35,7 +43,30 @@ export function baseFrame(uav: string): string {
 }
 
 export function select(uav: string): void {
-  useVehicles.setState({ selected: uav });
+  useVehicles.setState({ selected: uav, group: [] });
+}
+
+/** Select UAVs together; of none, nothing changes. */
+export function selectGroup(uavs: readonly string[]): void {
+  if (uavs.length === 0) return;
+  useVehicles.setState(({ selected }) => ({
+    selected: uavs.includes(selected) ? selected : uavs[0]!,
+    group: uavs.length > 1 ? uavs : [],
+  }));
+}
+
+/** Select one UAV more, or one less. */
+export function toggleSelected(uav: string): void {
+  const uavs = allSelected();
+  const others = uavs.filter((name) => name !== uav);
+  selectGroup(others.length < uavs.length ? others : [...uavs, uav]);
+}
+
+/** All UAVs that are selected. */
+export function allSelected(): readonly string[] {
+  const { group, selected } = useVehicles.getState();
+  if (group.length > 0) return group;
+  return selected === "" ? [] : [selected];
 }
 
 /** Follow what a simulation tells; robots that tell nothing are known by their frames. */
@@ -52,10 +83,17 @@ export function followVehicles(volery: boolean): void {
 }
 
 function take(list: VehicleState[]): void {
-  useVehicles.setState(({ selected }) => ({
-    list,
-    selected: list.some(({ name }) => name === selected) ? selected : (list[0]?.name ?? ""),
-  }));
+  useVehicles.setState(({ selected, group }) => {
+    const names = new Set(list.map(({ name }) => name));
+    const kept = group.every((name) => names.has(name))
+      ? group
+      : group.filter((name) => names.has(name));
+    return {
+      list,
+      selected: names.has(selected) ? selected : (kept[0] ?? list[0]?.name ?? ""),
+      group: kept.length > 1 ? kept : [],
+    };
+  });
 }
 
 /** Whoever has a base frame, with what that tells. */

@@ -5,7 +5,7 @@ import { pickUav } from "../scene/stage/picking.ts";
 import type { Moment, Part } from "../scene/stage/part.ts";
 import { shown } from "../scene/stage/shown.ts";
 import { cameraOfUav } from "../scene/sensing/cameras.ts";
-import { shapeOf } from "../scene/uavs/airframeGeometry.ts";
+import { reachOf } from "../scene/uavs/airframeGeometry.ts";
 import { fleet } from "../scene/uavs/fleet.ts";
 import { currentWorld } from "../scene/world/currentWorld.ts";
 import { useTool } from "../state/tool.ts";
@@ -240,17 +240,4 @@ export class CameraMan implements Part {
     else if (event.code === "KeyF") this.focus();
     else if (event.code === "KeyR" || event.code === "Home") putCamera(null);
   }
-}
-
-const reaches = new Map<string, number>();
-
-/** From the middle of an airframe to its farthest rotor, m. */
-function reachOf(airframe: string): number {
-  let reach = reaches.get(airframe);
-  if (reach === undefined) {
-    const { rotors, rotorRadius } = shapeOf(airframe);
-    reach = rotorRadius + Math.max(...rotors.map(([x, y]) => Math.hypot(x!, y!)));
-    reaches.set(airframe, reach);
-  }
-  return reach;
 }

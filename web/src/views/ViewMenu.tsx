@@ -18,6 +18,8 @@ import {
   Send,
   type LucideIcon,
 } from "lucide-react";
+import { COLOURINGS, type Colouring } from "../lib/uavColours.ts";
+import { colourBy, useColouring } from "../state/colouring.ts";
 import {
   LAYERS,
   look,
@@ -56,6 +58,14 @@ const TITLES: Record<Layer, string> = {
   markers: "Markers",
   frames: "Coordinate frames",
   shadows: "Shadows",
+};
+
+const COLOURING_TITLES: Record<Colouring, string> = {
+  uav: "own",
+  type: "type",
+  speed: "speed",
+  battery: "battery",
+  height: "height",
 };
 
 /** The small menu of views and layers over the picture. */
@@ -112,6 +122,7 @@ function ViewButton({ view, number, active }: { view: ViewName; number: number; 
 
 function LayersMenu() {
   const { show, quality } = useView();
+  const by = useColouring((colouring) => colouring.by);
   return (
     <Menu closeOnItemClick={false} position="bottom-start" withinPortal>
       <Menu.Target>
@@ -132,6 +143,16 @@ function LayersMenu() {
             onChange={(event) => showLayer(layer, event.currentTarget.checked)}
           />
         ))}
+        <Text size="xs" c="dimmed" mt="xs" mb={4}>
+          Colour of UAVs
+        </Text>
+        <SegmentedControl
+          size="xs"
+          aria-label="Colour of UAVs"
+          data={COLOURINGS.map((value) => ({ value, label: COLOURING_TITLES[value] }))}
+          value={by}
+          onChange={(value) => colourBy(value as Colouring)}
+        />
         <Text size="xs" c="dimmed" mt="xs" mb={4}>
           Quality
         </Text>

@@ -53,6 +53,9 @@ class FlockNode(SavedAttributes, Node):
     obstacles_m: x, y, radius of obstacles.
     scan: topic of a planar LIDAR, below a UAV's namespace, whose echoes are obstacles as well.
     lidar_mount: x, y, z of that LIDAR in the body, m.
+    hostile: names of UAVs that the team flees; they are no part of it, even where `uavs` has them.
+    hostile_m: distance from a hostile UAV at which a UAV begins to flee.
+    flee_m_s: speed at which it flees at half that distance and nearer.
 
     """
 
@@ -64,12 +67,14 @@ class FlockNode(SavedAttributes, Node):
     """Implementations of `SwarmBehaviour` by the names of the parameter `behaviour`."""
 
     STATE = ("_goals", "_next", "_last_status", "_ticks")
-    PARTS = ("_team", "_scans")
+    PARTS = ("_team", "_hostile", "_scans")
     WARMUP_TASKS = ("volery.autonomy.swarm.warmup:flocking",)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("flock", **options)
-        names = self.declare_parameter("uavs", ["uav1", "uav2", "uav3"]).value
+        named = self.declare_parameter("uavs", ["uav1", "uav2", "uav3"]).value
+        hostile = self.declare_parameter("hostile", []).value
+        names = [name for name in named if name not in hostile]
         self._behaviour = self._named_behaviour()
         odometry = str(self.declare_parameter("odometry", "odom").value)
         self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
@@ -83,6 +88,8 @@ class FlockNode(SavedAttributes, Node):
             raise PlanError("goals_m has one goal for each UAV")
         self._own_goals = np.array(own_goals, float).reshape(-1, 2)
         self._arrival = number(self, "arrival_m", 3.0, 0.1, 1000.0)
+        self._hostile_m = number(self, "hostile_m", 20.0, 0.1, 1000.0)
+        self._flee_speed = number(self, "flee_m_s", 5.0, 0.0, 100.0)
         arena = self.declare_parameter("arena_m", []).value or NO_ARENA
         if len(arena) != len(NO_ARENA):
             raise PlanError("arena_m is [x_min, y_min, x_max, y_max]")
@@ -94,6 +101,7 @@ class FlockNode(SavedAttributes, Node):
         self._ticks = 0
         self._last_status = ""
         self._team = TeamLink(self, names, odometry, self._height)
+        self._hostile = TeamLink(self, hostile, odometry, self._height, is_commanded=False)
         scan = str(self.declare_parameter("scan", "").value)
         self._scans = TeamScans(self, self._team, scan)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
@@ -120,14 +128,18 @@ class FlockNode(SavedAttributes, Node):
             if not team.is_up():
                 return
             self._goals = self._first_goals()
-        team.drop_lost(self.get_clock().now_ns())
+        now_ns = self.get_clock().now_ns()
+        team.drop_lost(now_ns)
         if not team.members:
             return
         position, velocity = team.motion()
         goals = self._goals_now(position)
         flock = flock_within(position, velocity, self._behaviour.radius_m)
+        preferred = self._preferred(goals - position)
+        for hostile in self._hostile.present(now_ns).values():
+            self._flee(position - hostile.position[:2], preferred)
         around = self._around._replace(echoes=self._scans.echoes(team.members, position))
-        wanted = self._behaviour.velocities(flock, self._preferred(goals - position), around)
+        wanted = self._behaviour.velocities(flock, preferred, around)
         for row, level in zip(team.members, wanted, strict=True):
             team.command(row, level, self._height)
         self._ticks += 1
@@ -161,6 +173,17 @@ class FlockNode(SavedAttributes, Node):
         preferred: Array = ways / np.maximum(distance, 1e-9) * speed
         return preferred
 
+    def _flee(self, away: Array, preferred: Array) -> None:
+        """Adds to preferred velocities (M, 2) what UAVs lack to part from a hostile UAV.
+
+        away: (M, 2) m, from that UAV. Velocities across the way are left: the team passes it.
+        """
+        distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        outward = away / distance
+        part = np.clip(2.0 - 2.0 * distance / self._hostile_m, 0.0, 1.0)
+        lacking = part * self._flee_speed - (preferred * outward).sum(axis=1, keepdims=True)
+        preferred += np.where(part > 0.0, np.maximum(lacking, 0.0), 0.0) * outward
+
     def _publish_status(self, position: Array, velocity: Array, goals: Array) -> None:
         apart = np.linalg.norm(position[:, None] - position, axis=2)
         apart[np.diag_indices(len(apart))] = math.inf
@@ -172,5 +195,6 @@ class FlockNode(SavedAttributes, Node):
             "arrived": int(arrived.sum()),
             "order": round(float(np.linalg.norm(headings.mean(axis=0))), 3),
             "least_distance_m": round(float(apart.min()), 3) if len(apart) > 1 else None,
+            "refused": self._team.num_refused,
         }
         self._last_status = publish_status(self._status, status, self._last_status)

@@ -5,6 +5,11 @@ Each neighbour allows a half plane of velocities; of those that all allow, a UAV
 nearest to its preferred velocity (section 5.1). Where there is none, it gives way to all
 neighbours as equally as possible (section 5.3), but not to obstacles, which it approaches only as
 fast as it may brake.
+
+By these rules alone, UAVs that have arrived block those behind: a UAV that prefers to stay yields
+only to one that touches it. Therefore a UAV prefers to be out of the way of neighbours that prefer
+to fly faster than itself, as those farther from their goals do. This changes what it prefers, and
+not what is allowed.
 """
 
 from __future__ import annotations
@@ -41,6 +46,8 @@ class OrcaSettings(NamedTuple):
     turn_rad: float = 0.35
     """Turn to the right of a preferred velocity that a neighbour forbids; without it, UAVs that
     meet symmetrically stop."""
+    way_s: float = 1.0
+    """Time ahead in which a UAV is out of the way of those that prefer to fly faster."""
     max_speed_m_s: float = 5.0
 
 
@@ -77,11 +84,12 @@ def _choose_all(
     most = num_obstacles
     for i in range(count):
         most = max(most, num_obstacles + first[i + 1] - first[i])
-    planes, relaxed = np.empty((most, 3)), np.empty((most, 3))
+    planes, passing, relaxed = np.empty((most, 3)), np.empty((most, 3)), np.empty((most, 3))
     for i in range(count):
         hard = _add_obstacles(planes, position, i, arena, cylinders, echoes, settings)
         end = hard
-        for j in neighbour[first[i] : first[i + 1]]:
+        near = neighbour[first[i] : first[i + 1]]
+        for j in near:
             ux, uy = velocity[i, 0], velocity[i, 1]
             nx, ny, change = half_plane(
                 position[j, 0] - position[i, 0],
@@ -95,16 +103,54 @@ def _choose_all(
             planes[end, 0], planes[end, 1] = nx, ny
             planes[end, 2] = nx * ux + ny * uy + 0.5 * change
             end += 1
-        vx, vy = preferred[i, 0], preferred[i, 1]
+        gives_way, vx, vy = _give_way(position, preferred, i, near, settings, passing, relaxed)
         is_forbidden = False
         for k in range(hard, end):
             is_forbidden |= planes[k, 0] * vx + planes[k, 1] * vy < planes[k, 2]
-        if is_forbidden:
+        if is_forbidden and not gives_way:
             c, s = math.cos(settings.turn_rad), math.sin(settings.turn_rad)
             vx, vy = c * vx + s * vy, c * vy - s * vx
         wanted[i, 0], wanted[i, 1] = _choose(
             planes, hard, end, vx, vy, settings.max_speed_m_s, relaxed
         )
+
+
+@inner_kernel
+def _give_way(
+    position: Any,
+    preferred: Any,
+    i: int,
+    near: Any,
+    settings: OrcaSettings,
+    planes: Any,
+    relaxed: Any,
+) -> tuple[bool, float, float]:
+    """Returns whether UAV i leaves its preferred velocity for neighbours, and what it prefers then.
+
+    It gives way to those that prefer to fly faster, as if they did, and does the whole avoidance.
+    """
+    vx, vy = preferred[i, 0], preferred[i, 1]
+    speed, found, is_clear = math.hypot(vx, vy), 0, True
+    for j in near:
+        ux, uy = preferred[j, 0], preferred[j, 1]
+        if math.hypot(ux, uy) <= speed + _EQUAL:
+            continue
+        nx, ny, change = half_plane(
+            position[j, 0] - position[i, 0],
+            position[j, 1] - position[i, 1],
+            vx - ux,
+            vy - uy,
+            settings.distance_m,
+            settings.way_s,
+            settings.step_s,
+        )
+        planes[found, 0], planes[found, 1], planes[found, 2] = nx, ny, nx * vx + ny * vy + change
+        is_clear &= change <= 0.0
+        found += 1
+    if is_clear:
+        return False, vx, vy
+    x, y = _choose(planes, 0, found, vx, vy, settings.max_speed_m_s, relaxed)
+    return True, x, y
 
 
 @inner_kernel

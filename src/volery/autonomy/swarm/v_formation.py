@@ -26,6 +26,12 @@ from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import String
 from volery.graph.nodes.node import Node
 
+WING_SPAN_M = 3.0
+"""Default of the parameter `wing_span_m`."""
+MIN_DISTANCE = 1.0
+"""Default of the parameter `min_distance`, wing spans."""
+LOST_COST = 0.1
+"""Default of the parameter `lost_cost`."""
 _PERIOD_S = 0.05
 _GAIN = 0.8
 """Velocity per distance from the bird, 1/s."""
@@ -106,13 +112,13 @@ class VFormation(SavedAttributes, Node):
         super().__init__("v_formation", **options)
         names = self.declare_parameter("uavs", [f"uav{k + 1}" for k in range(_SEVEN)]).value
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._span = number(self, "wing_span_m", 3.0, 0.1, 100.0)
+        self._span = number(self, "wing_span_m", WING_SPAN_M, 0.1, 100.0)
         self._duration_s = number(self, "step_s", 2.0, 0.1, 100.0)
         self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
         self._height_step = number(self, "height_step_m", 0.0, 0.0, 100.0)
-        distance = number(self, "min_distance", 1.0, 0.0, 1.5)
+        distance = number(self, "min_distance", MIN_DISTANCE, 0.0, 1.5)
         self._slices = int(self.declare_parameter("slices", 10, min_value=1, max_value=1000).value)
-        self._lost_cost = number(self, "lost_cost", 0.1, 1e-3, 1e3)
+        self._lost_cost = number(self, "lost_cost", LOST_COST, 1e-3, 1e3)
         self._seed = int(self.declare_parameter("seed", 1, min_value=0).value)
         self._gathers = bool(self.declare_parameter("gathers", True).value)
         self._max_speed = max_speed = number(self, "max_speed_m_s", 4.0, 0.1, 100.0)
@@ -363,5 +369,6 @@ class VFormation(SavedAttributes, Node):
             "searches": self._num_searches,
             "reason": self._note,
             "time_to_v_s": None if self._solved_ns < 0 else self._solved_ns / NS_PER_S,
+            "refused": self._team.num_refused,
         }
         self._last_status = publish_status(self._status, status, self._last_status)

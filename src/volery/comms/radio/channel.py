@@ -14,7 +14,7 @@ from volery.comms.addresses import is_station
 from volery.comms.link_model import Delivery
 from volery.comms.protocol import StationFrame
 from volery.comms.radio.path_loss import Paths, loss_db
-from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
+from volery.comms.radio.reception import air_time_ns, noise_rise_db, packet_error_rate, snr_db
 from volery.core import rng
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
@@ -38,6 +38,14 @@ class _Sent(NamedTuple):
     ends_ns: int
 
 
+class Jammer(NamedTuple):
+    """A transmitter of noise in the whole channel."""
+
+    position_map: tuple[float, float, float]
+    """m."""
+    power_dbm: float
+
+
 class RadioChannel(SavedAttributes):
     """Decides loss and delay of frames; call it in the order of time.
 
@@ -45,7 +53,10 @@ class RadioChannel(SavedAttributes):
     that results do not depend on the other stations' traffic.
     """
 
-    STATE = ("_free_ns", "_sent", "_losses", "_looked_ns", "counts", "_seed")
+    STATE = (
+        *("_free_ns", "_sent", "_losses", "_looked_ns", "counts", "_seed"),
+        *("_jammers", "_noise_rises"),
+    )
 
     def __init__(self, radio: Radio, seed: int, places: Places, looks: Looks) -> None:
         self._radio = radio
@@ -57,6 +68,9 @@ class RadioChannel(SavedAttributes):
         self._sent: dict[int, _Sent] = {}
         self._losses: dict[tuple[int, int], float] = {}
         self._looked_ns = -1
+        self._jammers: list[Jammer] = []
+        self._noise_rises: dict[int, float] = {}
+        """By how much jammers raise the noise of each station, dB; empty without jammers."""
         self.counts: Counter[str] = Counter()
         """Frames `sent`, `received` and `faded` (once for each receiver), `crowded_out` by the
         queue limit.
@@ -85,9 +99,23 @@ class RadioChannel(SavedAttributes):
             return _LOST
         return Delivery(False, ends_ns - time_ns + round(self._radio.latency_s * NS_PER_S))
 
-    def snr_db(self, time_ns: int, one: int, other: int) -> float:
-        """Returns the signal-to-noise ratio between two stations, dB; -inf without a position."""
-        pair = min(one, other), max(one, other)
+    def jam(self, jammer: Jammer) -> None:
+        """Adds a jammer; it disturbs reception from the next frame on."""
+        self._jammers.append(jammer)
+        self._looked_ns = -1
+
+    def end_jamming(self, jammer: Jammer) -> None:
+        """Removes a jammer, if there is one like it."""
+        if jammer in self._jammers:
+            self._jammers.remove(jammer)
+            self._looked_ns = -1
+
+    def snr_db(self, time_ns: int, source: int, destination: int) -> float:
+        """Returns the signal-to-noise ratio at a destination, dB; -inf without a position.
+
+        The noise is that of the receiver and of all jammers.
+        """
+        pair = min(source, destination), max(source, destination)
         stale_ns = round(self._radio.update_s * NS_PER_S)
         if self._looked_ns < 0 or time_ns - self._looked_ns >= stale_ns or pair not in self._losses:
             self._look(time_ns)
@@ -96,7 +124,8 @@ class RadioChannel(SavedAttributes):
         block = time_ns // round(self._radio.shadowing_s * NS_PER_S)
         key = rng.stream_key(self._seed, f"radio/{pair[0]}-{pair[1]}/shadowing")
         fading = self._radio.shadowing_db * float(rng.normal(key, block))
-        return snr_db(self._radio, self._losses[pair]) - fading
+        rise = self._noise_rises.get(destination, 0.0)
+        return snr_db(self._radio, self._losses[pair]) - fading - rise
 
     def reseed(self, seed: int) -> None:
         """Draws from other random streams."""
@@ -125,14 +154,28 @@ class RadioChannel(SavedAttributes):
         return tries, False
 
     def _look(self, time_ns: int) -> None:
-        """Updates the path loss between all stations."""
+        """Updates the path loss between all stations, and the noise of jammers at each."""
         places = self._places()
         pairs = list(combinations(sorted(places), 2))
-        self._looked_ns, self._losses = time_ns, {}
+        self._looked_ns, self._losses, self._noise_rises = time_ns, {}, {}
         if not pairs:
             return
+        if self._jammers:
+            rises = self._rises(np.array(list(places.values())))
+            self._noise_rises = dict(zip(places, rises.tolist(), strict=True))
         starts = np.array([places[one] for one, _ in pairs])
         ends = np.array([places[other] for _, other in pairs])
         distance = np.linalg.norm(ends - starts, axis=1)
         losses = loss_db(self._radio, distance, self._looks(starts, ends))
         self._losses = dict(zip(pairs, losses.tolist(), strict=True))
+
+    def _rises(self, positions: Array) -> Array:
+        """Returns by how much all jammers raise the noise at positions (S, 3) m, map: (S,) dB."""
+        received_mw = np.zeros(len(positions))
+        for jammer in self._jammers:
+            starts = np.tile(jammer.position_map, (len(positions), 1))
+            distance = np.linalg.norm(positions - starts, axis=1)
+            lost_db = loss_db(self._radio, distance, self._looks(starts, positions))
+            received_dbm = jammer.power_dbm + self._radio.antenna_gain_dbi - lost_db
+            received_mw += 10.0 ** (0.1 * received_dbm)
+        return noise_rise_db(self._radio, received_mw)

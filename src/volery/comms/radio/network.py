@@ -18,7 +18,7 @@ from volery.comms.link_model import Delivery, Link, ideal_link
 from volery.comms.local_network import LocalNetwork
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import StationFrame, StationFrameKind
-from volery.comms.radio.channel import RadioChannel
+from volery.comms.radio.channel import Jammer, RadioChannel
 from volery.comms.server.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
 from volery.core.undo_steps import UndoSteps
@@ -124,6 +124,15 @@ class RadioNetwork:
         """Raises CommandError if a UAV has no radio."""
         self._address_of(name)
 
+    def check_jamming(self) -> None:
+        """Raises `CommandError` if jammers disturb no link."""
+        self._jammed_link()
+
+    def jam(self, position_map: tuple[float, float, float], power_dbm: float, by: int) -> None:
+        """Adds (by = 1) or removes (by = -1) a jammer at a position, m, with a power."""
+        link, jammer = self._jammed_link(), Jammer(position_map, power_dbm)
+        (link.jam if by > 0 else link.end_jamming)(jammer)
+
     def restore_all(self, name: str) -> None:
         """Removes the faults of a UAV's radio."""
         member = self._members.get(name)
@@ -214,6 +223,11 @@ class RadioNetwork:
     def _forget(self, name: str, member: _Member) -> None:
         self._members.pop(name, None)
         self._silent.pop(member.address, None)
+
+    def _jammed_link(self) -> RadioChannel:
+        if self._radio is None:
+            raise CommandError('radio links = "ideal" know no noise that a jammer could raise')
+        return self._radio
 
     def _address_of(self, name: str) -> int:
         if name not in self._members:

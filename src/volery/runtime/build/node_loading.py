@@ -1,4 +1,4 @@
-"""Starts the nodes that a scenario or a launch profile names.
+"""Starts the nodes that a scenario or a launch profile names; finds functions of expectations.
 
 Importing a module runs its code. `ScenarioAccess` determines which modules may be imported:
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
@@ -99,6 +99,26 @@ def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]
         return _find_class(path, where, access)
 
 
+def find_function(path: str, where: str, access: ScenarioAccess) -> Callable[..., Any]:
+    """Imports a user's function, `module:function`.
+
+    Unlike a node, it is called with any arguments that a file names, so that it needs a trusted
+    scenario even if it is installed. Raises `ScenarioError` if it may not run or is no function.
+    """
+    if access.is_confined or not access.is_trusted:
+        raise ScenarioError(
+            f"{where}: runs code of its own ({path}): give --trust, or load_scenario(..., "
+            "trust=True) in Python, if it is yours"
+        )
+    with _also_from(*_local_folders(access)):
+        module = _import(path.partition(":")[0], f"{where}: '{path}' cannot be imported", access)
+    found = getattr(module, path.partition(":")[2], None)
+    if not callable(found):
+        raise ScenarioError(f"{where}: '{path}' is no function{_source_of(module)}")
+    function: Callable[..., Any] = found
+    return function
+
+
 def is_local(module: str | None, access: ScenarioAccess) -> bool:
     """Returns whether a module is found only in the scenario's folder or the working folder.
 
@@ -168,19 +188,7 @@ def _installed_only(access: ScenarioAccess) -> Iterator[None]:
 def _find_class(path: str, where: str, access: ScenarioAccess) -> type[Any]:
     module_name, class_name = path.split(":")
     provide_ros_imports()
-    failure = f"{where}: node '{path}' cannot be imported"
-    try:
-        module = importlib.import_module(module_name)
-    except Exception as error:
-        missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
-        if missing and f"{module_name}.".startswith(f"{missing}."):
-            folders = " or ".join(
-                dict.fromkeys(str(each.resolve()) for each in _local_folders(access))
-            )
-            raise ScenarioError(
-                f"{failure}: no module '{missing}' is installed or lies in {folders}"
-            ) from None
-        raise _broken(failure, error, advice_for_missing(missing or "")) from error
+    module = _import(module_name, f"{where}: node '{path}' cannot be imported", access)
     try:
         found = getattr(module, class_name)
     except AttributeError:
@@ -192,6 +200,22 @@ def _find_class(path: str, where: str, access: ScenarioAccess) -> type[Any]:
             f"{where}: '{path}' is no subclass of volery.graph.nodes.node.Node{_hint(found)}"
         )
     return found
+
+
+def _import(name: str, failure: str, access: ScenarioAccess) -> ModuleType:
+    """Imports a module. Raises `ScenarioError` with the failure and its reason."""
+    try:
+        return importlib.import_module(name)
+    except Exception as error:
+        missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{name}.".startswith(f"{missing}."):
+            folders = " or ".join(
+                dict.fromkeys(str(each.resolve()) for each in _local_folders(access))
+            )
+            raise ScenarioError(
+                f"{failure}: no module '{missing}' is installed or lies in {folders}"
+            ) from None
+        raise _broken(failure, error, advice_for_missing(missing or "")) from error
 
 
 def _source_of(module: ModuleType) -> str:

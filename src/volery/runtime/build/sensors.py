@@ -58,14 +58,19 @@ def build_banks(
             own.append(sensor)
     builder = _Builder(scenario, fleet, scene, estimation)
     banks: list[SensorBank] = [
-        FaultableBank(builder.build(group), RESULT_OF[group[0].spec.kind].MEASURED)
+        FaultableBank(
+            builder.build(group),
+            RESULT_OF[group[0].spec.kind].MEASURED,
+            [sensor.key for sensor in group],
+        )
         for group in groups.values()
         if group
     ]
     nodding = [sensor for sensor in fitted if sensor.mount.nods]
     if nodding:
         joints = JointBank(tuple(s.id for s in nodding), tuple(s.mount for s in nodding))
-        banks.append(FaultableBank(joints, JointAngles.MEASURED))
+        keys = [sensor.key for sensor in nodding]
+        banks.append(FaultableBank(joints, JointAngles.MEASURED, keys))
     return banks
 
 

@@ -1,11 +1,11 @@
-"""The faults of a simulation: of motors, sensors, GNSS and radio, gusts and displacements."""
+"""The faults of a simulation: of motors, sensors, GNSS and radio, jammers, gusts, displacements."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from volery.engine.faults import FaultPlan
+from volery.engine.faults import FaultPlan, uav_of
 from volery.graph.graph import Graph
 from volery.scenario.faults import Fault, LastingFault, parse_fault
 
@@ -20,8 +20,7 @@ class SimulationFaults:
         self._plan, self._graph, self._check_open = plan, graph, check_open
 
     def __repr__(self) -> str:
-        kinds = ", ".join(f"{fault.model_dump()['kind']} of {fault.uav}" for fault in self.active)
-        return f"<active faults: {kinds or 'none'}>"
+        return f"<active faults: {', '.join(map(_text_of, self.active)) or 'none'}>"
 
     @property
     def active(self) -> tuple[LastingFault, ...]:
@@ -48,3 +47,8 @@ class SimulationFaults:
         """
         self._check_open()
         self._plan.end(parse_fault(fault), client=self._graph.acting_client)
+
+
+def _text_of(fault: LastingFault) -> str:
+    kind, uav = fault.model_dump()["kind"], uav_of(fault)
+    return kind if uav is None else f"{kind} of {uav}"

@@ -11,7 +11,10 @@ PERIOD_S = 0.05
 
 
 class SwarmTeam(NodeBench):
-    """UAVs at positions (N, 3) m that follow their velocity commands at once."""
+    """UAVs at positions (N, 3) m that follow their velocity commands at once.
+
+    The node flies all of them, unless its parameter `uavs` names others.
+    """
 
     def __init__(self, node, positions, **parameters):
         super().__init__()
@@ -19,7 +22,7 @@ class SwarmTeam(NodeBench):
         self.names = [f"uav{k + 1}" for k in range(len(self.positions))]
         self.velocities = np.zeros_like(self.positions)
         self.silent = set()
-        self.node = self.start(node, uavs=self.names, **parameters)
+        self.node = self.start(node, **{"uavs": self.names} | parameters)
         self.statuses = self.listen(f"{self.node.full_name}/status")
         for row, name in enumerate(self.names):
             topic = f"/{name}/cmd_vel"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_flocking import Swarm
+from test_flocking import Swarm, block
 
 from volery.autonomy.planning.reciprocal_avoidance import half_plane
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
@@ -71,6 +71,17 @@ def test_uavs_that_are_too_near_part():
     swarm = Swarm(Orca(), [[0.0, 0.0], [0.5, 0.1]], [[0.0, 0.0], [0.5, 0.1]])
     swarm.fly(5.0)
     assert np.hypot(*(swarm.position[1] - swarm.position[0])) > 1.5
+
+
+def test_uavs_at_their_goals_let_others_pass():
+    """Eight stand around the goal of a ninth, 3 m apart; it flies straight to it in 7 s."""
+    goal = block(3, 3, 3.0)
+    start = goal.copy()
+    start[4] = -12.0, 3.0
+    swarm = Swarm(Orca(), start, goal)
+    swarm.fly(22.0)
+    assert np.linalg.norm(swarm.position - swarm.goal, axis=1).max() < 0.5
+    assert swarm.least_distance > 1.9
 
 
 def test_it_brakes_before_what_its_own_sensor_sees():

@@ -16,13 +16,14 @@ export function ActiveFaults() {
       {active.map((fault, i) => (
         <Group key={`${i} ${JSON.stringify(fault)}`} gap="xs" role="listitem" wrap="nowrap">
           <Text size="xs" flex={1}>
-            <b>{fault.uav}</b> {faultText(fault)} · {spanOf(fault)}
+            {fault.uav !== undefined && <b>{fault.uav} </b>}
+            {faultText(fault)} · {spanOf(fault)}
           </Text>
           <Button
             size="compact-xs"
             variant="default"
             disabled={whyNot !== null}
-            aria-label={`End ${faultText(fault)} of ${fault.uav}`}
+            aria-label={`End ${faultText(fault)}${fault.uav === undefined ? "" : ` of ${fault.uav}`}`}
             onClick={() => void succeeds("End of the fault", endFault(fault))}
           >
             End

@@ -6,18 +6,27 @@ import { injectFault } from "../../link/commands.ts";
 import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { simulatedS } from "../../state/simulation.ts";
-import { useVehicles } from "../../state/vehicles.ts";
+import { useVehicleNames, useVehicles } from "../../state/vehicles.ts";
 import { ActiveFaults } from "./ActiveFaults.tsx";
-import { EFFECTS, faultOf, KINDS, USUAL, type FaultForm, type FaultKind } from "./fault.ts";
+import {
+  EFFECTS,
+  faultOf,
+  KINDS,
+  OF_NO_UAV,
+  USUAL,
+  type FaultForm,
+  type FaultKind,
+} from "./fault.ts";
 import { VectorInput } from "./VectorInput.tsx";
 
-const PASSING: readonly FaultKind[] = ["motor", "sensor", "gnss_loss", "radio"];
+const PASSING: readonly FaultKind[] = ["motor", "sensor", "gnss_loss", "radio", "jamming"];
 const SENSORS = ["imu", "odom", "range", "fix", "barometer", "magnetometer", "camera"];
 
 /** Break something while it flies. */
 export default function Faults() {
   const [form, setForm] = useState(USUAL);
-  const { list, selected } = useVehicles();
+  const names = useVehicleNames();
+  const selected = useVehicles((vehicles) => vehicles.selected);
   const whyNot = useWhyNot();
   const change = (changed: Partial<FaultForm>) => setForm({ ...form, ...changed });
   const uav = form.uav === "" ? selected : form.uav;
@@ -41,13 +50,13 @@ export default function Faults() {
             allowDeselect={false}
             onChange={(kind) => change({ kind: kind as FaultKind })}
           />
-          {form.kind !== "gust" && (
+          {!OF_NO_UAV.includes(form.kind) && (
             <Select
               size="xs"
               label="UAV"
               searchable
               limit={100}
-              data={list.map(({ name }) => name)}
+              data={names}
               value={uav}
               allowDeselect={false}
               onChange={(name) => change({ uav: name ?? "" })}
@@ -148,6 +157,33 @@ function Details({ form, change }: DetailsProps) {
               onChange={(event) => change({ bias: event.currentTarget.value })}
             />
           )}
+          {form.effect === "noisy" && (
+            <TextInput
+              size="xs"
+              label="Standard deviation"
+              value={form.sigma}
+              onChange={(event) => change({ sigma: event.currentTarget.value })}
+            />
+          )}
+        </Group>
+      );
+    case "jamming":
+      return (
+        <Group gap="xs" grow>
+          <VectorInput
+            label="Position, m"
+            value={form.vector}
+            onChange={(vector) => change({ vector })}
+          />
+          <NumberInput
+            size="xs"
+            label="Power"
+            suffix=" dBm"
+            min={-30}
+            max={80}
+            value={form.powerDbm}
+            onChange={(powerDbm) => change({ powerDbm: Number(powerDbm) })}
+          />
         </Group>
       );
     case "gust":

@@ -29,6 +29,23 @@ describe("a fault", () => {
     expect(faultOf({ ...sensor, effect: "biased" }, 0)).toMatchObject({ bias: [0.1, -2, 3] });
   });
 
+  it("has a standard deviation only where it is noise", () => {
+    const sensor = { ...FORM, kind: "sensor" as const, effect: "noisy", sigma: "0.5 1" };
+    expect(faultOf(sensor, 0)).toMatchObject({ effect: "noisy", sigma: [0.5, 1] });
+    expect(faultOf(sensor, 0)).not.toHaveProperty("bias");
+    expect(faultOf({ ...sensor, effect: "stuck" }, 0)).not.toHaveProperty("sigma");
+  });
+
+  it("of the radio channel has a position and is of no UAV", () => {
+    const jammer = { ...FORM, kind: "jamming" as const, lastsS: 2 };
+    expect(faultOf({ ...jammer, vector: [60, 0, 5], powerDbm: 25 }, 5)).toEqual({
+      kind: "jamming",
+      until_s: 7,
+      position_m: [60, 0, 5],
+      power_dbm: 25,
+    });
+  });
+
   it("of the air is of no UAV", () => {
     expect(faultOf({ ...FORM, kind: "gust" }, 0)).not.toHaveProperty("uav");
   });

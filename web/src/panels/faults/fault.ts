@@ -5,6 +5,7 @@ export const KINDS = [
   { value: "sensor", label: "Sensor" },
   { value: "gnss_loss", label: "GNSS loss" },
   { value: "radio", label: "Radio loss" },
+  { value: "jamming", label: "Radio jamming" },
   { value: "gust", label: "Gust" },
   { value: "displacement", label: "Displacement" },
 ] as const;
@@ -14,7 +15,11 @@ export const EFFECTS = [
   { value: "dropped", label: "Dropped" },
   { value: "stuck", label: "Stuck" },
   { value: "biased", label: "Biased" },
+  { value: "noisy", label: "Noisy" },
 ];
+
+/** Kinds that are of no UAV. */
+export const OF_NO_UAV: readonly FaultKind[] = ["jamming", "gust"];
 
 export type Vector = [number, number, number];
 
@@ -31,7 +36,10 @@ export interface FaultForm {
   effect: string;
   /** Numbers with commas between them. */
   bias: string;
-  /** Wind of a gust, m/s, or displacement, m; map. */
+  sigma: string;
+  /** Power of a jammer, dBm. */
+  powerDbm: number;
+  /** Wind of a gust, m/s, displacement or position of a jammer, m; map. */
   vector: Vector;
   riseS: number;
   holdS: number;
@@ -46,6 +54,8 @@ export const USUAL: FaultForm = {
   sensor: "imu",
   effect: "dropped",
   bias: "0.1, 0, 0",
+  sigma: "0.1, 0.1, 0.1",
+  powerDbm: 30,
   vector: [5, 0, 0],
   riseS: 0.5,
   holdS: 1,
@@ -55,17 +65,21 @@ export const USUAL: FaultForm = {
 export function faultOf(form: FaultForm, nowS: number): Record<string, unknown> {
   const { kind, uav, lastsS } = form;
   const own = { kind, uav };
-  const passing = lastsS > 0 ? { ...own, until_s: nowS + lastsS } : own;
+  const end = lastsS > 0 ? { until_s: nowS + lastsS } : {};
+  const passing = { ...own, ...end };
   switch (kind) {
     case "motor":
       return { ...passing, rotor: form.rotor, thrust_factor: form.thrustFactor };
     case "sensor": {
       const wrong = { ...passing, sensor: form.sensor, effect: form.effect };
-      return form.effect === "biased" ? { ...wrong, bias: numbersOf(form.bias) } : wrong;
+      if (form.effect === "biased") return { ...wrong, bias: numbersOf(form.bias) };
+      return form.effect === "noisy" ? { ...wrong, sigma: numbersOf(form.sigma) } : wrong;
     }
     case "gnss_loss":
     case "radio":
       return passing;
+    case "jamming":
+      return { kind, ...end, position_m: form.vector, power_dbm: form.powerDbm };
     case "gust":
       return { kind, velocity_m_s: form.vector, rise_s: form.riseS, hold_s: form.holdS };
     case "displacement":

@@ -9,7 +9,8 @@ import {
 } from "lucide-react";
 import { useEffect, useState, type ReactNode } from "react";
 import { sendCommand, type FlightCommand } from "../../link/commands.ts";
-import { attempt, showSuccess } from "../../state/notices.ts";
+import { commandAll, commandText } from "../../state/commanding.ts";
+import { showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 
 const KILL_ASKED_MS = 4000;
@@ -47,34 +48,42 @@ const BUTTONS: { order: FlightCommand; label: string; hint: string; icon: ReactN
   },
 ];
 
-/** Flight commands of one press each. */
-export function FlightCommands({ uav }: { uav: string }) {
+/** What needs a look at each UAV is not for several at once. */
+const FOR_ONE: readonly FlightCommand[] = ["arm", "kill"];
+
+/** Flight commands of one press each, to all of some UAVs. */
+export function FlightCommands({ uavs }: { uavs: readonly string[] }) {
   const whyNot = useWhyNot();
   const [busy, setBusy] = useState<FlightCommand | null>(null);
-  const give = async (order: FlightCommand, label: string) => {
+  const alone = uavs.length === 1;
+  const give = async (order: FlightCommand) => {
     setBusy(order);
-    const said = await attempt(`${uav}: ${label.toLowerCase()}`, sendCommand(uav, order));
+    await commandAll(commandText(order), uavs, async (uav) => {
+      const said = await sendCommand(uav, order);
+      if (order === "arm" && said) showSuccess(said);
+    });
     setBusy(null);
-    if (order === "arm" && said) showSuccess(said);
   };
   return (
     <SimpleGrid cols={2} spacing={6} role="group" aria-label="Commands">
-      {BUTTONS.map(({ order, label, hint, icon }) => (
-        <Tooltip key={order} label={whyNot ?? hint}>
-          <Button
-            variant="light"
-            size="compact-md"
-            h={34}
-            leftSection={icon}
-            disabled={whyNot !== null}
-            loading={busy === order}
-            onClick={() => void give(order, label)}
-          >
-            {label}
-          </Button>
-        </Tooltip>
-      ))}
-      <Kill uav={uav} disabled={whyNot !== null} give={() => void give("kill", "Kill")} />
+      {BUTTONS.filter(({ order }) => alone || !FOR_ONE.includes(order)).map(
+        ({ order, label, hint, icon }) => (
+          <Tooltip key={order} label={whyNot ?? hint}>
+            <Button
+              variant="light"
+              size="compact-md"
+              h={34}
+              leftSection={icon}
+              disabled={whyNot !== null}
+              loading={busy === order}
+              onClick={() => void give(order)}
+            >
+              {label}
+            </Button>
+          </Tooltip>
+        ),
+      )}
+      {alone && <Kill uav={uavs[0]!} disabled={whyNot !== null} give={() => void give("kill")} />}
     </SimpleGrid>
   );
 }

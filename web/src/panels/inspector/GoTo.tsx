@@ -2,6 +2,7 @@ import { ActionIcon, Button, Group, NumberInput, Tooltip } from "@mantine/core";
 import { MousePointerClick, Navigation } from "lucide-react";
 import { useState } from "react";
 import { link } from "../../link/link.ts";
+import { commandAll } from "../../state/commanding.ts";
 import { goByClick, sendTo } from "../../state/goals.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { baseFrame } from "../../state/vehicles.ts";
@@ -18,7 +19,7 @@ export function GoTo({ uav }: { uav: string }) {
       <form
         onSubmit={(event) => {
           event.preventDefault();
-          void sendTo(uav, place);
+          void commandAll("go to", [uav], () => sendTo(uav, place));
         }}
       >
         <Group gap={6} wrap="nowrap" align="end">
@@ -52,7 +53,7 @@ export function GoTo({ uav }: { uav: string }) {
               variant="default"
               aria-label="Go to a clicked position"
               disabled={whyNot !== null}
-              onClick={() => void goByClick(uav)}
+              onClick={() => void goByClick([uav])}
             >
               <MousePointerClick size={15} />
             </ActionIcon>

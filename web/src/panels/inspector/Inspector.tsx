@@ -1,19 +1,24 @@
 import { Badge, Group, ScrollArea, Select, Stack, Text } from "@mantine/core";
-import { select, useVehicles } from "../../state/vehicles.ts";
+import { select, useVehicleNames, useVehicles } from "../../state/vehicles.ts";
 import { colourOf, modeText } from "../vehicles/modes.ts";
 import { Attitude } from "./Attitude.tsx";
 import { Figures } from "./Figures.tsx";
 import { GoTo } from "./GoTo.tsx";
 import { FlightCommands } from "./FlightCommands.tsx";
 import { ControlAuthority } from "./ControlAuthority.tsx";
+import { GroupCommands } from "./GroupCommands.tsx";
 import { Removal } from "./Removal.tsx";
 import { Repair } from "./Repair.tsx";
 import { Sensors } from "./Sensors.tsx";
 
+/** Names that the list shows at a time; typing finds others. */
+const MOST_SHOWN = 200;
+
 /** The selected UAV: state, sensors and commands. */
 export default function Inspector() {
-  const names = useVehicles(({ list }) => list.map(({ name }) => name).join(" "));
+  const names = useVehicleNames();
   const selected = useVehicles((vehicles) => vehicles.selected);
+  const group = useVehicles((vehicles) => vehicles.group);
   const known = useVehicles(({ list }) => list.some(({ name }) => name === selected));
   if (!known) {
     return (
@@ -29,7 +34,8 @@ export default function Inspector() {
           <Select
             flex={1}
             aria-label="Selected UAV"
-            data={names.split(" ")}
+            data={names}
+            limit={MOST_SHOWN}
             value={selected}
             searchable
             allowDeselect={false}
@@ -38,7 +44,11 @@ export default function Inspector() {
           <Mode />
         </Group>
         <Repair key={`repair ${selected}`} uav={selected} />
-        <FlightCommands key={`commands ${selected}`} uav={selected} />
+        {group.length > 0 ? (
+          <GroupCommands uavs={group} />
+        ) : (
+          <FlightCommands key={`commands ${selected}`} uavs={[selected]} />
+        )}
         <Attitude key={`attitude ${selected}`} uav={selected} />
         <Figures />
         <GoTo key={selected} uav={selected} />

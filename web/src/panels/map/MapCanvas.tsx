@@ -9,9 +9,15 @@ import {
 } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
 import { POSE } from "../../link/protocol.ts";
-import { sendAbove } from "../../state/goals.ts";
+import { sendAllAbove } from "../../state/goals.ts";
 import { givePosition, useTool } from "../../state/tool.ts";
-import { baseFrame, select, useVehicles } from "../../state/vehicles.ts";
+import {
+  allSelected,
+  baseFrame,
+  select,
+  toggleSelected,
+  useVehicles,
+} from "../../state/vehicles.ts";
 import { heightAt } from "../../state/worldPlan.ts";
 
 const WHEEL = 1.0015;
@@ -60,7 +66,12 @@ export function MapCanvas({ canvas, shown, move, stopFollowing, clickSends }: Ma
     if (from === null || from.dragged || shown.current === null) return;
     const { left, top } = event.currentTarget.getBoundingClientRect();
     const size = sizeOf(event.currentTarget);
-    click(shown.current, size, event.clientX - left, event.clientY - top, clickSends);
+    click(shown.current, size, {
+      px: event.clientX - left,
+      py: event.clientY - top,
+      more: event.ctrlKey || event.metaKey,
+      sends: clickSends,
+    });
   };
   const key = (event: KeyboardEvent<HTMLCanvasElement>) => {
     const element = event.currentTarget;
@@ -96,20 +107,28 @@ export function MapCanvas({ canvas, shown, move, stopFollowing, clickSends }: Ma
   );
 }
 
+interface Click {
+  px: number;
+  py: number;
+  /** Whether a clicked UAV joins those that are selected. */
+  more: boolean;
+  /** Whether a click beside UAVs sends the selected ones there. */
+  sends: boolean;
+}
+
 /** A UAV that is clicked is selected; elsewhere the place is taken. */
-function click(view: MapView, size: Size, px: number, py: number, sends: boolean): void {
+function click(view: MapView, size: Size, { px, py, more, sends }: Click): void {
   const [x, y] = placeOf(view, size, px, py);
   if (useTool.getState().asking !== null) return givePosition({ x, y, z: heightAt(x, y) });
-  const { selected, list } = useVehicles.getState();
-  const hit = list.find(({ name }) => {
+  const hit = useVehicles.getState().list.find(({ name }) => {
     const row = link.frames.row(baseFrame(name));
     if (row < 0) return false;
     const [ux, uy] = link.frames.now.subarray(row * POSE, row * POSE + 2);
     const [ax, ay] = pixelOf(view, size, ux!, uy!);
     return Math.hypot(ax - px, ay - py) < GRAB_PX;
   });
-  if (hit !== undefined) select(hit.name);
-  else if (sends && selected !== "") void sendAbove(selected, { x, y });
+  if (hit !== undefined) (more ? toggleSelected : select)(hit.name);
+  else if (sends && allSelected().length > 0) void sendAllAbove(allSelected(), { x, y });
 }
 
 /** React's own wheel listeners cannot keep the page from scrolling. */

@@ -2,19 +2,21 @@ import { useComputedColorScheme } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState, type RefObject } from "react";
 import { AutoFit, pixelOf, type MapView, type Point, type Size } from "../../lib/mapProjection.ts";
 import { link } from "../../link/link.ts";
+import { useColouring } from "../../state/colouring.ts";
 import { useGoals } from "../../state/goals.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
 import { useNarrow } from "../../state/useNarrow.ts";
 import { useWorldPlan, type WorldPlan } from "../../state/worldPlan.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
 import { drawPlan, type PlanColours } from "./drawPlan.ts";
-import { Pen } from "./drawTraffic.ts";
+import { Pen, type Traveller } from "./drawTraffic.ts";
 import { extentOf } from "./extent.ts";
 import { MapButtons } from "./MapButtons.tsx";
 import { MapLegend } from "./MapLegend.tsx";
 import { MapCanvas } from "./MapCanvas.tsx";
 import { useTrails } from "./trails.ts";
 import { usePlannedPath } from "./usePlannedPath.ts";
+import { uavColour } from "../../lib/uavColours.ts";
 import { ownEntry } from "../../lib/ownEntry.ts";
 
 const FRAME_MS = 66;
@@ -123,7 +125,7 @@ function useDrawing(
       pen.line(path.current, "#f59f00", [5, 4]);
       const goal = ownEntry(useGoals.getState(), selected);
       if (goal !== undefined) pen.cross(goal.x, goal.y);
-      pen.uavs(link.frames, useVehicles.getState().list, selected);
+      pen.uavs(link.frames, travellers(), selected, new Set(useVehicles.getState().group));
       pen.bar();
     };
     draw();
@@ -143,6 +145,18 @@ function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRe
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
   return context;
+}
+
+/** All UAVs, in the colours that they have in the scene where these stand for something. */
+function travellers(): readonly Traveller[] {
+  const { list } = useVehicles.getState();
+  const { by, top, types } = useColouring.getState();
+  if (by === "uav") return list;
+  return list.map((uav) => ({
+    name: uav.name,
+    crashed: uav.crashed,
+    colour: `rgb(${uavColour(uav, by, top, types).join(" ")})`,
+  }));
 }
 
 function places(): Point[] {

@@ -10,6 +10,8 @@ import { eye } from "../../state/eye.ts";
 export interface Traveller {
   name: string;
   crashed: boolean;
+  /** Left out: that of all UAVs. */
+  colour?: string;
 }
 
 const CONE_PX = 70;
@@ -18,6 +20,22 @@ const BAR_PX = 90;
 const NAME_ROOM_PX = 28;
 const RED = "#f03e3e";
 const EYE = "rgba(34, 139, 230, 0.28)";
+
+/** Corners of the arrow of a UAV that heads right, px. */
+const ARROW = [7, 0, -5, 4.5, -3, 0, -5, -4.5] as const;
+/** Radius of the ring around a UAV of the selected group, px. */
+const GROUP_PX = 8;
+
+function addArrow(path: Path2D, px: number, py: number, yaw: number): void {
+  const [c, s] = [Math.cos(yaw), -Math.sin(yaw)];
+  for (let i = 0; i < ARROW.length; i += 2) {
+    const [x, y] = [ARROW[i]!, ARROW[i + 1]!];
+    const [ax, ay] = [px + c * x - s * y, py + s * x + c * y];
+    if (i === 0) path.moveTo(ax, ay);
+    else path.lineTo(ax, ay);
+  }
+  path.closePath();
+}
 
 /** Draws on one canvas with one view. */
 export class Pen {
@@ -72,8 +90,17 @@ export class Pen {
     context.stroke();
   }
 
-  /** All UAVs with their heading, the selected one circled in red. */
-  uavs(frames: Frames, travellers: readonly Traveller[], selected: string): void {
+  /** All UAVs with their heading, the selected one circled in red, those of its group too. */
+  uavs(
+    frames: Frames,
+    travellers: readonly Traveller[],
+    selected: string,
+    group: ReadonlySet<string>,
+  ): void {
+    // Arrows of one colour are one path: a thousand paths of their own take longer than the rest.
+    const arrows = new Map<string, Path2D>();
+    const dots = new Path2D();
+    let circled: [number, number] | null = null;
     for (const uav of travellers) {
       const row = frames.row(baseFrame(uav.name));
       if (row < 0 || frames.now.length < (row + 1) * POSE) continue;
@@ -81,28 +108,37 @@ export class Pen {
       if (Number.isNaN(pose[0]!)) continue;
       const [px, py] = this.at(pose[0]!, pose[1]!);
       const { yaw } = eulerOf(pose[3]!, pose[4]!, pose[5]!, pose[6]!);
-      this.arrow(px, py, yaw, uav.crashed);
-      if (uav.name === selected) this.circle(px, py, uav.name);
+      const colour = this.colourOf(uav);
+      let path = arrows.get(colour);
+      if (path === undefined) arrows.set(colour, (path = new Path2D()));
+      addArrow(path, px, py, yaw);
+      if (group.has(uav.name)) {
+        dots.moveTo(px + GROUP_PX, py);
+        dots.arc(px, py, GROUP_PX, 0, 2 * Math.PI);
+      }
+      if (uav.name === selected) circled = [px, py];
     }
+    this.paint(arrows, dots);
+    if (circled !== null) this.circle(...circled, selected);
   }
 
-  private arrow(px: number, py: number, yaw: number, crashed: boolean): void {
+  private colourOf({ crashed, colour }: Traveller): string {
+    if (crashed) return "#868e96";
+    return colour ?? (this.dark ? "#66d9e8" : "#0b7285");
+  }
+
+  private paint(arrows: ReadonlyMap<string, Path2D>, dots: Path2D): void {
     const { context } = this;
-    context.save();
-    context.translate(px, py);
-    context.rotate(-yaw);
-    context.fillStyle = crashed ? "#868e96" : this.dark ? "#66d9e8" : "#0b7285";
     context.strokeStyle = this.dark ? "#10131a" : "#ffffff";
     context.lineWidth = 1;
-    context.beginPath();
-    context.moveTo(7, 0);
-    context.lineTo(-5, 4.5);
-    context.lineTo(-3, 0);
-    context.lineTo(-5, -4.5);
-    context.closePath();
-    context.fill();
-    context.stroke();
-    context.restore();
+    for (const [colour, path] of arrows) {
+      context.fillStyle = colour;
+      context.fill(path);
+      context.stroke(path);
+    }
+    context.strokeStyle = RED;
+    context.lineWidth = 1.5;
+    context.stroke(dots);
   }
 
   private circle(px: number, py: number, name: string): void {

@@ -28,14 +28,17 @@ export function useTrails(): ReadonlyMap<string, Trail> {
   useEffect(() => useEpoch.subscribe(() => trails.current.clear()), []);
   useEffect(
     () =>
-      useVehicles.subscribe(({ list }) => {
+      useVehicles.subscribe(({ list }, before) => {
+        if (list === before.list) return;
         const known = trails.current;
+        const present = new Set<string>();
         for (const { name, position } of list) {
+          present.add(name);
           if (!known.has(name) || isRestarting(name)) known.set(name, new Trail());
           else known.get(name)!.add(position.x, position.y);
         }
         for (const name of known.keys()) {
-          if (!list.some((vehicle) => vehicle.name === name)) known.delete(name);
+          if (!present.has(name)) known.delete(name);
         }
       }),
     [],

@@ -85,7 +85,7 @@ interface FieldChoiceProps {
 /** A topic, and one of its numbers. */
 function FieldChoice({ axis, line, choose }: FieldChoiceProps) {
   const all = useTopics(({ list }) => list);
-  const { paths, reason } = usePaths(line?.type ?? "");
+  const { paths, reason } = usePaths(line?.topic ?? "", line?.type ?? "");
   return (
     <div role="group" aria-label={`${axis} axis`}>
       <Text size="xs" fw={600} mb={2}>

@@ -12,7 +12,7 @@ export function AddLine({ plot }: { plot: number }) {
   const all = useTopics(({ list }) => list);
   const [topic, setTopic] = useState<string | null>(null);
   const type = all.find(({ name }) => name === topic)?.type ?? "";
-  const { paths, reason } = usePaths(type);
+  const { paths, reason } = usePaths(topic ?? "", type);
   return (
     <Group gap={6} wrap="nowrap">
       <Select

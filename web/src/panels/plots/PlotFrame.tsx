@@ -15,7 +15,8 @@ export interface LegendEntry {
   colour: string;
   /** What it is at present. */
   value: string;
-  remove: () => void;
+  /** Left out: it goes with its plot. */
+  remove?: () => void;
 }
 
 interface PlotFrameProps {
@@ -24,6 +25,8 @@ interface PlotFrameProps {
   legend: readonly LegendEntry[];
   /** What an empty plot says. */
   hint: string;
+  /** What is saved; left out: the points of all lines. */
+  csv?: () => string;
   /** Buttons of this sort of plot. */
   actions?: ReactNode;
   /** Below the drawing: what adds to it. */
@@ -31,7 +34,8 @@ interface PlotFrameProps {
 }
 
 /** Legend, buttons and room of a plot. */
-export function PlotFrame({ plot, drawn, legend, hint, actions, children }: PlotFrameProps) {
+export function PlotFrame(props: PlotFrameProps) {
+  const { plot, drawn, legend, hint, csv = () => csvOfLines(plot), actions, children } = props;
   return (
     <section className={classes.plot} aria-label={`Plot ${plot.id}`}>
       <Group gap={4} wrap="nowrap" justify="space-between" align="start">
@@ -57,7 +61,7 @@ export function PlotFrame({ plot, drawn, legend, hint, actions, children }: Plot
             aria-label="Download as CSV"
             title="Download as CSV"
             disabled={legend.length === 0}
-            onClick={() => downloadPlot(plot)}
+            onClick={() => download(`volery_plot_${plot.id}.csv`, csv(), "text/csv")}
           >
             <Download size={14} />
           </ActionIcon>
@@ -96,13 +100,14 @@ function Entry({ name, title, colour, value, remove }: LegendEntry) {
       <Text size="xs" ff="monospace" truncate data-line={title ?? name} title={title}>
         {name} {value}
       </Text>
-      <CloseButton size="xs" aria-label={`Remove ${title ?? name}`} onClick={remove} />
+      {remove !== undefined && (
+        <CloseButton size="xs" aria-label={`Remove ${title ?? name}`} onClick={remove} />
+      )}
     </Group>
   );
 }
 
-function downloadPlot(plot: Plot): void {
+function csvOfLines(plot: Plot): string {
   const lines = linesOf(plot);
-  const text = csvOf(lines.map(nameOf), lines.map(seriesOf));
-  download(`volery_plot_${plot.id}.csv`, text, "text/csv");
+  return csvOf(lines.map(nameOf), lines.map(seriesOf));
 }

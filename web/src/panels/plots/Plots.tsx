@@ -3,10 +3,18 @@ import { Button, Group, Select } from "@mantine/core";
 import { Pause, Play, Plus } from "lucide-react";
 import { useState } from "react";
 import { positionCurve } from "../../lib/usualCurves.ts";
-import { addPlot, addXYPlot, setWindow, usePlots } from "../../state/plots.ts";
+import {
+  addDistancePlot,
+  addPlot,
+  addXYPlot,
+  setWindow,
+  usePlots,
+  type Plot,
+} from "../../state/plots.ts";
 import { useTopics } from "../../state/topics.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import classes from "./Plots.module.css";
+import { DistancePlotView } from "./DistancePlotView.tsx";
 import { TimePlotView } from "./TimePlotView.tsx";
 import { XYPlotView } from "./XYPlotView.tsx";
 
@@ -56,18 +64,34 @@ export default function Plots() {
         >
           x-y plot
         </Button>
+        <Button
+          size="compact-xs"
+          variant="default"
+          leftSection={<Plus size={13} />}
+          title="How the distances between UAVs are distributed now"
+          onClick={addDistancePlot}
+        >
+          Distances
+        </Button>
       </Group>
       <div className={classes.plots}>
-        {plots.map((plot) =>
-          plot.kind === "xy" ? (
-            <XYPlotView key={plot.id} plot={plot} paused={paused} />
-          ) : (
-            <TimePlotView key={plot.id} plot={plot} paused={paused} />
-          ),
-        )}
+        {plots.map((plot) => (
+          <PlotView key={plot.id} plot={plot} paused={paused} />
+        ))}
       </div>
     </div>
   );
+}
+
+function PlotView({ plot, paused }: { plot: Plot; paused: boolean }) {
+  switch (plot.kind) {
+    case "xy":
+      return <XYPlotView plot={plot} paused={paused} />;
+    case "distances":
+      return <DistancePlotView plot={plot} paused={paused} />;
+    default:
+      return <TimePlotView plot={plot} paused={paused} />;
+  }
 }
 
 function beginXYPlot(): void {

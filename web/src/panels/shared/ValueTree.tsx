@@ -1,7 +1,7 @@
 import { ActionIcon, Button, Group, Text, UnstyledButton } from "@mantine/core";
 import { ChartLine, ChevronDown, ChevronRight } from "lucide-react";
 import { useState } from "react";
-import { join, numberOf } from "../../lib/fieldPath.ts";
+import { join, numberOf, parsed } from "../../lib/fieldPath.ts";
 import classes from "./ValueTree.module.css";
 
 const PAGE = 40;
@@ -47,7 +47,8 @@ interface EntryProps extends BranchProps {
   step: string | number;
 }
 
-function Entry({ step, value, path, onPlot }: EntryProps) {
+function Entry({ step, value: told, path, onPlot }: EntryProps) {
+  const value = parsed(told);
   const branch = value !== null && typeof value === "object";
   return branch ? (
     <Branch step={step} value={value} path={path} onPlot={onPlot} />

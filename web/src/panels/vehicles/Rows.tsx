@@ -1,5 +1,5 @@
 import { Badge, Text } from "@mantine/core";
-import { memo, useEffect, useRef, useState, type KeyboardEvent } from "react";
+import { memo, useEffect, useMemo, useRef, useState, type KeyboardEvent } from "react";
 import type { volery_interfaces_VehicleState as VehicleState } from "../../messages/generated.ts";
 import { faultText } from "../../lib/activeFaults.ts";
 import { useFaults } from "../../state/faults.ts";
@@ -9,16 +9,21 @@ const ROW_PX = 44;
 /** Rows beside what is seen, so that scrolling finds them there. */
 const SPARE = 6;
 
+/** `more`: beside what is selected. */
+export type Choice = "alone" | "more";
+
 interface RowsProps {
   list: VehicleState[];
   selected: string;
-  choose: (name: string) => void;
+  group: readonly string[];
+  choose: (name: string, how: Choice) => void;
   /** Of who is clicked twice. */
   open: () => void;
 }
 
 /** Rows of hundreds of UAVs, of which those are made that are seen. */
-export function Rows({ list, selected, choose, open }: RowsProps) {
+export function Rows({ list, selected, group, choose, open }: RowsProps) {
+  const together = useMemo(() => new Set(group), [group]);
   const box = useRef<HTMLDivElement>(null);
   const [top, setTop] = useState(0);
   const height = box.current?.clientHeight ?? 600;
@@ -41,7 +46,7 @@ export function Rows({ list, selected, choose, open }: RowsProps) {
     if (next === undefined) return;
     event.preventDefault();
     event.stopPropagation();
-    choose(next.name);
+    choose(next.name, "alone");
   };
   return (
     <div
@@ -49,6 +54,7 @@ export function Rows({ list, selected, choose, open }: RowsProps) {
       className="rows"
       role="listbox"
       tabIndex={0}
+      aria-multiselectable
       aria-label="UAVs"
       aria-activedescendant={at < 0 ? undefined : `uav-${selected}`}
       onScroll={(event) => setTop(event.currentTarget.scrollTop)}
@@ -61,7 +67,7 @@ export function Rows({ list, selected, choose, open }: RowsProps) {
             key={vehicle.name}
             vehicle={vehicle}
             top={(first + i) * ROW_PX}
-            selected={vehicle.name === selected}
+            selected={vehicle.name === selected || together.has(vehicle.name)}
             choose={choose}
           />
         ))}
@@ -74,7 +80,7 @@ interface RowProps {
   vehicle: VehicleState;
   top: number;
   selected: boolean;
-  choose: (name: string) => void;
+  choose: (name: string, how: Choice) => void;
 }
 
 const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
@@ -86,7 +92,7 @@ const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
       role="option"
       aria-selected={selected}
       style={{ top, height: ROW_PX }}
-      onClick={() => choose(name)}
+      onClick={(event) => choose(name, event.ctrlKey || event.metaKey ? "more" : "alone")}
     >
       <div className="row-name">
         <Text size="sm" fw={600} truncate>

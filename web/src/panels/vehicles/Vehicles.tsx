@@ -1,12 +1,12 @@
-import { ActionIcon, Group, Text, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Group, Text, Tooltip } from "@mantine/core";
 import { Plus } from "lucide-react";
-import { useState } from "react";
+import { useCallback, useState } from "react";
 import { counted } from "../../lib/counted.ts";
 import { openPanel } from "../../state/layout.ts";
 import { useConnection } from "../../state/connection.ts";
-import { select, useVehicles } from "../../state/vehicles.ts";
+import { select, selectGroup, toggleSelected, useVehicles } from "../../state/vehicles.ts";
 import { FilterInput } from "../shared/FilterInput.tsx";
-import { Rows } from "./Rows.tsx";
+import { Rows, type Choice } from "./Rows.tsx";
 import { Spawn } from "./Spawn.tsx";
 
 const SEARCH_FROM = 12;
@@ -18,15 +18,36 @@ export default function Vehicles() {
   const volery = useConnection((connection) => connection.volery);
   const [filter, setFilter] = useState("");
   const [spawning, setSpawning] = useState(false);
-  const shown = list.filter(({ name, airframe, mode }) =>
-    `${name} ${airframe} ${mode}`.toLowerCase().includes(filter.toLowerCase()),
+  const group = useVehicles((vehicles) => vehicles.group);
+  const sought = filter.toLowerCase();
+  const shown =
+    sought === ""
+      ? list
+      : list.filter(({ name, airframe, mode }) =>
+          `${name} ${airframe} ${mode}`.toLowerCase().includes(sought),
+        );
+  const choose = useCallback(
+    (name: string, how: Choice) => (how === "more" ? toggleSelected : select)(name),
+    [],
   );
   return (
     <div className="column">
       <Group px="sm" pb={6} gap="xs" justify="space-between" wrap="nowrap">
         <Text size="sm" c="dimmed" aria-label="Number of UAVs">
           {counted(list.length, "UAV")}
+          {group.length > 0 && `, ${group.length} selected`}
         </Text>
+        {list.length > 1 && (
+          <Button
+            size="compact-xs"
+            variant="subtle"
+            ml="auto"
+            disabled={shown.length === 0}
+            onClick={() => selectGroup(shown.map(({ name }) => name))}
+          >
+            {sought === "" ? "Select all" : `Select ${shown.length}`}
+          </Button>
+        )}
         {volery && (
           <Tooltip label="Add UAVs">
             <ActionIcon
@@ -51,7 +72,7 @@ export default function Vehicles() {
           onChange={setFilter}
         />
       )}
-      <Rows list={shown} selected={selected} choose={select} open={inspect} />
+      <Rows list={shown} selected={selected} group={group} choose={choose} open={inspect} />
     </div>
   );
 }

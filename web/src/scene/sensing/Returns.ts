@@ -9,19 +9,16 @@ import {
 } from "three";
 import { PLAYING } from "../../link/commands.ts";
 import { link } from "../../link/link.ts";
-import { POSE } from "../../link/protocol.ts";
 import type { sensor_msgs_LaserScan, sensor_msgs_PointCloud2 } from "../../messages/generated.ts";
 import { simulatedS, useSimulation } from "../../state/simulation.ts";
-import { useVehicles } from "../../state/vehicles.ts";
 import { useView } from "../../state/view.ts";
 import { FADE } from "../air/fog.ts";
 import { frameOf } from "../stage/frames.ts";
 import { toMap } from "../stage/mapFrame.ts";
+import { NearUavs } from "../stage/nearUavs.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { LEVELS } from "../stage/quality.ts";
-import { shown } from "../stage/shown.ts";
 import { followTopics, isKnown, type Follower } from "../stage/topics.ts";
-import { fleet } from "../uavs/fleet.ts";
 import { currentWorld } from "../world/currentWorld.ts";
 import {
   colouringOf,
@@ -40,7 +37,6 @@ const FADE_S = 1;
 const MOST_PER_SWEEP = 4000;
 /** Sensors of the selected UAV and of so many UAVs nearest to it. */
 const NEAREST = 3;
-const LOOK_MS = 500;
 const FIXED: Record<ReturnColouring, Bytes | null> = {
   level: LEVEL,
   nodding: NODDING,
@@ -51,9 +47,7 @@ const FIXED: Record<ReturnColouring, Bytes | null> = {
 export class Returns implements Part {
   readonly object: Points<BufferGeometry, ShaderMaterial>;
   private readonly follower: Follower;
-  private readonly wanted = new Set<string>();
-  private lookedMs = 0;
-  private selected = "";
+  private readonly near = new NearUavs(NEAREST);
   private nowS = 0;
   private simulatedS = 0;
   private played = false;
@@ -86,11 +80,8 @@ export class Returns implements Part {
     const { lidar } = useView.getState().show;
     this.object.visible = lidar;
     this.follower.enable(lidar);
-    const { selected } = useVehicles.getState();
-    if (lidar && (nowMs - this.lookedMs > LOOK_MS || selected !== this.selected)) {
-      this.lookedMs = nowMs;
-      this.selected = selected;
-      this.chooseUavs();
+    if (lidar && this.near.update(nowMs)) {
+      this.follower.choose((topic) => this.near.includes(topic));
       this.follower.look();
     }
     const { nowS, size } = this.object.material.uniforms;
@@ -118,30 +109,8 @@ export class Returns implements Part {
     this.object.material.dispose();
   }
 
-  /** The selected UAV and those nearest to it. */
-  private chooseUavs(): void {
-    const middle = fleet.named(this.selected) ?? fleet.uavs[0];
-    const before = [...this.wanted].join(" ");
-    this.wanted.clear();
-    if (middle === undefined || middle.row < 0) return;
-    const distance = (row: number) => {
-      const [a, b] = [row * POSE, middle.row * POSE];
-      const gap = (i: number) => shown.poses[a + i]! - shown.poses[b + i]!;
-      return row < 0 ? Infinity : Math.hypot(gap(0), gap(1), gap(2));
-    };
-    const sorted = [...fleet.uavs].sort((a, b) => distance(a.row) - distance(b.row));
-    for (const { name } of sorted.slice(0, NEAREST + 1)) this.wanted.add(name);
-    if ([...this.wanted].join(" ") !== before)
-      this.follower.choose((topic) => this.isWanted(topic));
-  }
-
-  private isWanted(topic: string): boolean {
-    const uav = topic.split("/")[1] ?? "";
-    return fleet.named(uav) === undefined || this.wanted.has(uav);
-  }
-
   private begin(topic: string, type: string): (() => void) | null {
-    if (!this.isWanted(topic)) return null;
+    if (!this.near.includes(topic)) return null;
     // Where a simulation tells the returns themselves they are in place already, nodding included.
     if (type === SCAN && isKnown(topic.replace(/scan$/, "points"))) return null;
     const take = ({ message }: { message: unknown }) => this.take(topic, type, message);

@@ -34,3 +34,23 @@ export function pickUav(
   }
   return name;
 }
+
+/** Names of the UAVs whose middle is in a box of the picture; two of its corners in CSS pixels. */
+export function uavsWithin(
+  a: { x: number; y: number },
+  b: { x: number; y: number },
+  camera: PerspectiveCamera,
+  { width, height }: { width: number; height: number },
+): string[] {
+  const [left, right] = [Math.min(a.x, b.x), Math.max(a.x, b.x)];
+  const [top, bottom] = [Math.min(a.y, b.y), Math.max(a.y, b.y)];
+  const names: string[] = [];
+  for (const { name, row } of fleet.uavs) {
+    if (row < 0) continue;
+    point.fromArray(shown.poses, row * POSE).project(camera);
+    if (!(Math.abs(point.z) < 1)) continue;
+    const [x, y] = [(0.5 + 0.5 * point.x) * width, (0.5 - 0.5 * point.y) * height];
+    if (x >= left && x <= right && y >= top && y <= bottom) names.push(name);
+  }
+  return names;
+}

@@ -1,7 +1,9 @@
 import {
+  type BufferGeometry,
   CircleGeometry,
   DynamicDrawUsage,
   Group,
+  InstancedBufferAttribute,
   InstancedMesh,
   MeshStandardMaterial,
   ShaderMaterial,
@@ -14,7 +16,9 @@ import { placed, product, putMatrix, rotationOf } from "../stage/poses.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import type { AirframeShape } from "./airframes.generated.ts";
-import { bladesOf, bodyOf, shapeOf } from "./airframeGeometry.ts";
+import { bladesOf, bodyOf, reachOf, shapeOf } from "./airframeGeometry.ts";
+import { CRASHED } from "./colours.ts";
+import { Dots } from "./Dots.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
 
 /** So fast blades are shown to turn at full speed, rad/s: what a screen can show. */
@@ -23,20 +27,42 @@ const SPIN_RAD_S = 26;
 const BLUR = 0.25;
 /** A wreck that its pose leaves upright lies on its side, rad. */
 const WRECK_TILT = 0.55;
+/** A UAV whose radius on the screen is smaller has no rotors, CSS pixels. */
+const ROTORS_PX = 8;
+/** Below this radius it is a dot, CSS pixels. */
+const DOT_PX = 2;
 
-/** All UAVs as what they are: three draw calls for each kind of airframe. */
+/** What a frame shows of UAVs: how large they are on the screen decides how much. */
+interface Sight {
+  stepS: number;
+  eye: { x: number; y: number; z: number };
+  /** CSS pixels of a metre at a distance of one metre. */
+  scale: number;
+  dots: Dots;
+  /** Whether bodies have the colour of their UAV instead of their own ones. */
+  coloured: boolean;
+}
+
+/** All UAVs as what they are: three draw calls for each kind of airframe, one for all far ones. */
 export class Airframes implements Part {
   readonly object = new Group();
   private kinds: Kind[] = [];
+  private dots = new Dots(0, DOT_PX);
   private version = -1;
 
-  update({ stepS }: Moment): void {
+  update({ stepS, camera, height, renderer }: Moment): void {
     if (fleet.version !== this.version) this.rebuild();
-    for (const kind of this.kinds) kind.update(stepS);
+    const scale = height / (2 * Math.tan((camera.fov * Math.PI) / 360));
+    const { dots } = this;
+    dots.begin();
+    const sight = { stepS, eye: camera.position, scale, dots, coloured: fleet.coloured };
+    for (const kind of this.kinds) kind.update(sight);
+    dots.end(renderer.getPixelRatio());
   }
 
   dispose(): void {
     for (const kind of this.kinds) kind.dispose();
+    this.dots.dispose();
     this.object.clear();
   }
 
@@ -45,10 +71,14 @@ export class Airframes implements Part {
     this.dispose();
     const byName = new Map<string, number[]>();
     fleet.uavs.forEach(({ airframe }, i) => {
-      byName.set(airframe, [...(byName.get(airframe) ?? []), i]);
+      const members = byName.get(airframe);
+      if (members === undefined) byName.set(airframe, [i]);
+      else members.push(i);
     });
     this.kinds = [...byName].map(([airframe, members]) => new Kind(airframe, members));
+    this.dots = new Dots(fleet.uavs.length, DOT_PX);
     for (const kind of this.kinds) this.object.add(...kind.meshes);
+    this.object.add(this.dots.object);
   }
 }
 
@@ -61,25 +91,27 @@ const place = new Float64Array(3);
 class Kind {
   readonly meshes: InstancedMesh[];
   private readonly shape: AirframeShape;
-  private readonly body: InstancedMesh;
+  private readonly reach: number;
+  private readonly body: InstancedMesh<BufferGeometry, MeshStandardMaterial>;
   private readonly blades: InstancedMesh;
   private readonly discs: InstancedMesh;
   /** Of each member's rotors, rad. */
   private readonly angles: Float64Array;
+  /** Bodies and rotors of this frame so far. */
+  private bodies = 0;
+  private rotors = 0;
 
   constructor(
     airframe: string,
     private readonly members: readonly number[],
   ) {
     this.shape = shapeOf(airframe);
+    this.reach = reachOf(airframe);
     const rotors = members.length * this.shape.rotors.length;
-    const painted = new MeshStandardMaterial({
-      vertexColors: true,
-      roughness: 0.55,
-      metalness: 0.1,
-    });
-    this.body = instanced(new InstancedMesh(bodyOf(airframe), painted, members.length));
-    this.blades = instanced(new InstancedMesh(bladesOf(), painted, rotors));
+    this.body = instanced(new InstancedMesh(bodyOf(airframe), painted(), members.length));
+    const white = new Float32Array(3 * members.length).fill(1);
+    this.body.instanceColor = new InstancedBufferAttribute(white, 3).setUsage(DynamicDrawUsage);
+    this.blades = instanced(new InstancedMesh(bladesOf(), painted(), rotors));
     this.discs = instanced(new InstancedMesh(new CircleGeometry(1, 28), discMaterial(), rotors));
     this.body.castShadow = this.blades.castShadow = true;
     this.body.receiveShadow = true;
@@ -88,49 +120,60 @@ class Kind {
     this.angles = Float64Array.from(members, (member) => 1.7 * member);
   }
 
-  update(stepS: number): void {
-    this.members.forEach((member, i) => this.move(i, fleet.uavs[member], stepS));
-    for (const mesh of this.meshes) mesh.instanceMatrix.needsUpdate = true;
+  update(sight: Sight): void {
+    this.bodies = this.rotors = 0;
+    this.paint(sight.coloured);
+    this.members.forEach((member, i) => this.move(i, fleet.uavs[member], sight));
+    showFirst(this.body, this.bodies);
+    showFirst(this.blades, this.rotors);
+    showFirst(this.discs, this.rotors);
+    if (sight.coloured) this.body.instanceColor!.needsUpdate = true;
   }
 
-  private move(i: number, uav: ShownUav | undefined, stepS: number): void {
+  /** Give bodies the colours of their UAVs, or their own ones back. */
+  private paint(coloured: boolean): void {
+    const { material, instanceColor } = this.body;
+    if (material.vertexColors === !coloured) return;
+    material.vertexColors = !coloured;
+    material.needsUpdate = true;
+    instanceColor!.array.fill(1);
+    instanceColor!.needsUpdate = true;
+  }
+
+  private move(i: number, uav: ShownUav | undefined, sight: Sight): void {
     const at = (uav?.row ?? -1) * POSE;
     const { poses } = shown;
-    if (uav === undefined || at < 0 || !Number.isFinite(poses[at]! + poses[at + 6]!)) {
-      this.hide(i);
+    if (uav === undefined || at < 0 || !Number.isFinite(poses[at]! + poses[at + 6]!)) return;
+    const speed = uav.crashed ? 0 : uav.rotorSpeed;
+    this.angles[i] =
+      (this.angles[i]! + Math.sqrt(speed) * SPIN_RAD_S * sight.stepS) % (2 * Math.PI);
+    const [x, y, z] = [poses[at]!, poses[at + 1]!, poses[at + 2]!];
+    const { eye } = sight;
+    const radiusPx = (this.reach * sight.scale) / Math.hypot(x - eye.x, y - eye.y, z - eye.z);
+    if (radiusPx < DOT_PX) {
+      sight.dots.put(x, y, z, uav.crashed ? CRASHED : uav.colour);
       return;
     }
     rotationOf(poses, at, rotation);
     if (uav.crashed && rotation[8]! > 0.9) tilt(rotation);
-    const [x, y, z] = [poses[at]!, poses[at + 1]!, poses[at + 2]!];
-    putMatrix(this.body.instanceMatrix.array, i, rotation, 1, x, y, z);
-    const speed = uav.crashed ? 0 : uav.rotorSpeed;
-    this.angles[i] = (this.angles[i]! + Math.sqrt(speed) * SPIN_RAD_S * stepS) % (2 * Math.PI);
-    this.turn(i, x, y, z, speed);
+    const body = this.bodies++;
+    putMatrix(this.body.instanceMatrix.array, body, rotation, 1, x, y, z);
+    if (sight.coloured) this.body.instanceColor!.set(uav.colour, 3 * body);
+    if (radiusPx >= ROTORS_PX) this.turn(this.angles[i]!, x, y, z, speed);
   }
 
-  private turn(i: number, x: number, y: number, z: number, speed: number): void {
+  private turn(angle: number, x: number, y: number, z: number, speed: number): void {
     const { rotors, rotorRadius } = this.shape;
     const blurred = speed > BLUR;
-    for (let k = 0; k < rotors.length; k++) {
-      const rotor = rotors[k]!;
+    for (const rotor of rotors) {
       placed(rotation, rotor, 0, place);
       leaning(rotor, turned);
       product(rotation, turned, spun);
-      spin(spun, this.angles[i]! * rotor[6]!);
-      const at = i * rotors.length + k;
+      spin(spun, angle * rotor[6]!);
+      const at = this.rotors++;
       const [px, py, pz] = [x + place[0]!, y + place[1]!, z + place[2]!];
       putMatrix(this.blades.instanceMatrix.array, at, spun, rotorRadius, px, py, pz);
       putMatrix(this.discs.instanceMatrix.array, at, spun, blurred ? rotorRadius : 0, px, py, pz);
-    }
-  }
-
-  private hide(i: number): void {
-    const { length } = this.shape.rotors;
-    putMatrix(this.body.instanceMatrix.array, i, rotation, 0, 0, 0, 0);
-    for (let at = i * length; at < (i + 1) * length; at++) {
-      putMatrix(this.blades.instanceMatrix.array, at, rotation, 0, 0, 0, 0);
-      putMatrix(this.discs.instanceMatrix.array, at, rotation, 0, 0, 0, 0);
     }
   }
 
@@ -143,10 +186,24 @@ class Kind {
   }
 }
 
-function instanced(mesh: InstancedMesh): InstancedMesh {
+function painted(): MeshStandardMaterial {
+  return new MeshStandardMaterial({ vertexColors: true, roughness: 0.55, metalness: 0.1 });
+}
+
+function instanced<M extends InstancedMesh>(mesh: M): M {
   mesh.instanceMatrix.setUsage(DynamicDrawUsage);
   mesh.frustumCulled = false; // they are spread over the whole world
   return mesh;
+}
+
+/** Draw the first instances alone, and send no more than those. */
+function showFirst(mesh: InstancedMesh, count: number): void {
+  mesh.count = count;
+  mesh.visible = count > 0;
+  if (count === 0) return;
+  mesh.instanceMatrix.clearUpdateRanges();
+  mesh.instanceMatrix.addUpdateRange(0, 16 * count);
+  mesh.instanceMatrix.needsUpdate = true;
 }
 
 /** Lay a wreck on its side: turn it about its own x axis. */

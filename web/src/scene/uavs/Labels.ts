@@ -17,12 +17,16 @@ import { useView } from "../../state/view.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
-import { chooseLabels, type Box } from "./labelPositions.ts";
+import { chooseLabels, MOST_LABELS, type Box } from "./labelPositions.ts";
+import { NameCells } from "./nameCells.ts";
 
-/** Pixels of one name in the picture of all names. */
+/** Pixels of one name in the picture of names. */
 const CELL = { width: 192, height: 32 };
 const COLUMNS = 8;
-const MOST = 512;
+/** Names in the picture: those that are shown, and some that were and may be again. */
+const CELLS = 2 * MOST_LABELS;
+const ROWS = CELLS / COLUMNS;
+const FONT = "600 21px Inter, system-ui, sans-serif";
 const HEIGHT_PX = 17;
 const MARGIN_PX = 10;
 /** Names are chosen anew so often, ms: which of them would overlap changes slowly. */
@@ -39,7 +43,9 @@ export class Labels implements Part {
   private readonly canvas = document.createElement("canvas");
   private readonly texture: CanvasTexture;
   private readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
-  private widths = new Float64Array(0);
+  /** Of each name, in heights of a label. */
+  private readonly widths = new Map<string, number>();
+  private readonly cells = new NameCells(CELLS);
   private chosen: number[] = [];
   private chosenMs = 0;
   private version = -1;
@@ -47,7 +53,7 @@ export class Labels implements Part {
 
   constructor() {
     this.canvas.width = COLUMNS * CELL.width;
-    this.canvas.height = (MOST / COLUMNS) * CELL.height;
+    this.canvas.height = ROWS * CELL.height;
     this.texture = new CanvasTexture(this.canvas);
     this.texture.minFilter = LinearFilter;
     this.texture.generateMipmaps = false;
@@ -59,10 +65,11 @@ export class Labels implements Part {
 
   update(moment: Moment): void {
     const { names } = useView.getState().show;
-    if (fleet.version !== this.version) this.write();
-    if (moment.nowMs - this.chosenMs > CHOOSE_MS) {
+    if (fleet.version !== this.version || moment.nowMs - this.chosenMs > CHOOSE_MS) {
+      this.version = fleet.version;
       this.chosenMs = moment.nowMs;
       this.chosen = this.choose(moment, names);
+      this.write(this.chosen.map((i) => fleet.uavs[i]!.name));
     }
     this.place(moment);
   }
@@ -73,29 +80,37 @@ export class Labels implements Part {
     this.mesh.material.dispose();
   }
 
-  /** Write all names into one picture. */
-  private write(): void {
-    this.version = fleet.version;
-    this.chosen = [];
-    this.widths = new Float64Array(fleet.uavs.length);
+  /** Write names into the picture that are not in it. */
+  private write(names: readonly string[]): void {
+    const fresh = this.cells.hold(names);
     const context = this.canvas.getContext("2d");
-    if (context === null) return;
-    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    context.font = "600 21px Inter, system-ui, sans-serif";
+    if (fresh.length === 0 || context === null) return;
+    context.font = FONT;
     context.textBaseline = "middle";
-    fleet.uavs.slice(0, MOST).forEach(({ name }, i) => {
-      const x = (i % COLUMNS) * CELL.width;
-      const y = Math.floor(i / COLUMNS) * CELL.height;
-      const width = Math.min(CELL.width, context.measureText(name).width + 20);
-      this.widths[i] = width / CELL.height;
+    for (const [name, cell] of fresh) {
+      const x = (cell % COLUMNS) * CELL.width;
+      const y = Math.floor(cell / COLUMNS) * CELL.height;
+      context.clearRect(x, y, CELL.width, CELL.height);
       context.fillStyle = "rgba(14, 18, 24, 0.66)";
       context.beginPath();
-      context.roundRect(x, y, width, CELL.height, 9);
+      context.roundRect(x, y, this.widthOf(name) * CELL.height, CELL.height, 9);
       context.fill();
       context.fillStyle = "white";
       context.fillText(name, x + 10, y + CELL.height / 2 + 1, CELL.width - 20);
-    });
+    }
     this.texture.needsUpdate = true;
+  }
+
+  /** Width of a name's label, in heights of it. */
+  private widthOf(name: string): number {
+    let width = this.widths.get(name);
+    if (width === undefined) {
+      const context = this.canvas.getContext("2d");
+      if (context !== null) context.font = FONT;
+      width = Math.min(CELL.width, (context?.measureText(name).width ?? 0) + 20) / CELL.height;
+      this.widths.set(name, width);
+    }
+    return width;
   }
 
   /** Names that are seen and do not overlap; the selected and the hovered one before the others. */
@@ -103,7 +118,7 @@ export class Labels implements Part {
     const { selected } = useVehicles.getState();
     const { hovered } = useView.getState();
     const boxes: Box[] = [];
-    fleet.uavs.slice(0, MOST).forEach(({ name, row }, i) => {
+    fleet.uavs.forEach(({ name, row }, i) => {
       const wanted = name === hovered ? 2 : name === selected ? 1 : 0;
       if (row < 0 || (!all && wanted === 0)) return;
       this.point.fromArray(shown.poses, row * POSE);
@@ -111,7 +126,7 @@ export class Labels implements Part {
       this.point.project(camera);
       const { x, y, z } = this.point;
       if (!(Math.abs(x) < 1.05 && Math.abs(y) < 1.05 && Math.abs(z) < 1)) return;
-      const wide = this.widths[i]! * HEIGHT_PX;
+      const wide = this.widthOf(name) * HEIGHT_PX;
       const left = (0.5 + 0.5 * x) * width - wide / 2;
       const top = (0.5 - 0.5 * y) * height - HEIGHT_PX;
       boxes.push({ id: i, left, top, width: wide, height: HEIGHT_PX, rank: 1e6 * wanted - away });
@@ -131,7 +146,8 @@ export class Labels implements Part {
       if (uav === undefined || uav.row < 0) continue;
       const at = uav.row * POSE;
       place.setXYZ(count, shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]! + ABOVE_M);
-      look.setXYZ(count, this.widths[i]!, i % COLUMNS, Math.floor(i / COLUMNS));
+      const cell = this.cells.cellOf(uav.name);
+      look.setXYZ(count, this.widthOf(uav.name), cell % COLUMNS, Math.floor(cell / COLUMNS));
       tint.setXYZ(count, ...tintOf(uav, selected));
       count++;
     }
@@ -164,7 +180,7 @@ function geometryOf(): InstancedBufferGeometry {
   geometry.setAttribute("position", new BufferAttribute(corners, 3));
   geometry.setIndex([0, 1, 2, 0, 2, 3]);
   for (const name of ["place", "look", "tint"]) {
-    const attribute = new InstancedBufferAttribute(new Float32Array(3 * MOST), 3);
+    const attribute = new InstancedBufferAttribute(new Float32Array(3 * MOST_LABELS), 3);
     geometry.setAttribute(name, attribute.setUsage(DynamicDrawUsage));
   }
   return geometry;
@@ -181,7 +197,7 @@ void main() {
   at.xy += pixels * 2.0 / size * at.w;
   gl_Position = at;
   vec2 inCell = vec2((position.x + 0.5) * look.x * ${(CELL.height / CELL.width).toFixed(6)}, 1.0 - position.y);
-  vUv = (look.yz + inCell) / vec2(${COLUMNS.toFixed(1)}, ${(MOST / COLUMNS).toFixed(1)});
+  vUv = (look.yz + inCell) / vec2(${COLUMNS.toFixed(1)}, ${ROWS.toFixed(1)});
   vUv.y = 1.0 - vUv.y;
   vTint = tint;
 }

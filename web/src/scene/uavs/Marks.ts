@@ -11,10 +11,16 @@ import { CRASHED, SELECTED } from "./colours.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
 
 const SIDES = 28;
+/** Rings of a group are coarser: there may be hundreds. */
+const GROUP_SIDES = 8;
 const MOST_WRECKS = 32;
-const SEGMENTS = (MOST_WRECKS + 1) * (SIDES + 2);
+const MOST_OF_GROUP = 2048;
+const SEGMENTS = (MOST_WRECKS + 1) * (SIDES + 2) + MOST_OF_GROUP * GROUP_SIDES;
 
-/** A ring around the selected UAV and its line to the ground; red ones where a UAV has crashed. */
+/**
+ * A ring around each selected UAV, and a line to the ground below the one that the Inspector shows;
+ * red rings where a UAV has crashed.
+ */
 export class Marks implements Part {
   readonly object = new Group();
   private readonly lines = new SegmentLines(SEGMENTS, { above: true });
@@ -25,7 +31,7 @@ export class Marks implements Part {
   }
 
   update(moment: Moment): void {
-    const { selected } = useVehicles.getState();
+    const { selected, group } = useVehicles.getState();
     const onboard = useView.getState().name === "onboard";
     this.count = 0;
     let wrecks = 0;
@@ -34,6 +40,10 @@ export class Marks implements Part {
       if (isSelected && onboard && !uav.crashed) continue; // nobody sees the ring he sits in
       if (!isSelected && !(uav.crashed && wrecks++ < MOST_WRECKS)) continue;
       this.mark(uav, uav.crashed ? CRASHED : SELECTED, isSelected);
+    }
+    for (const name of group.slice(0, MOST_OF_GROUP)) {
+      const uav = name === selected ? undefined : fleet.named(name);
+      if (uav !== undefined) this.ring(uav, GROUP_SIDES, SELECTED);
     }
     this.lines.count = this.count;
     this.lines.send(0, this.count);
@@ -44,33 +54,31 @@ export class Marks implements Part {
     this.lines.dispose();
   }
 
-  private mark({ row, airframe }: ShownUav, colour: readonly number[], stem: boolean): void {
+  private mark(uav: ShownUav, colour: readonly number[], stem: boolean): void {
+    const radius = this.ring(uav, SIDES, colour);
+    if (!stem || Number.isNaN(radius)) return;
+    const [x, y, z] = shown.poses.subarray(uav.row * POSE) as unknown as [number, number, number];
+    const ground = currentWorld.ground.heightAt(x, y) + 0.02;
+    if (z - ground < radius) return;
+    const arm = 0.3 * radius;
+    this.lines.put(this.count++, x, y, z, x, y, ground, 1, colour, 0.45);
+    this.lines.put(this.count++, x - arm, y, ground, x + arm, y, ground, 2, colour, 0.8);
+  }
+
+  /** Returns the radius, m; NaN: it is not known where the UAV is. */
+  private ring({ row, airframe }: ShownUav, sides: number, colour: readonly number[]): number {
     const at = row * POSE;
-    if (at < 0 || !Number.isFinite(shown.poses[at])) return;
+    if (at < 0 || !Number.isFinite(shown.poses[at])) return NaN;
     const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
     const { rotors, rotorRadius } = shapeOf(airframe);
     const radius = 1.25 * (rotorRadius + Math.hypot(rotors[0]![0]!, rotors[0]![1]!));
-    const ground = currentWorld.ground.heightAt(x, y) + 0.02;
     let [ax, ay] = [x + radius, y];
-    for (let i = 1; i <= SIDES; i++) {
-      const turn = (2 * Math.PI * i) / SIDES;
+    for (let i = 1; i <= sides; i++) {
+      const turn = (2 * Math.PI * i) / sides;
       const [bx, by] = [x + radius * Math.cos(turn), y + radius * Math.sin(turn)];
       this.lines.put(this.count++, ax, ay, z, bx, by, z, 2, colour, 0.9);
       [ax, ay] = [bx, by];
     }
-    if (!stem || z - ground < radius) return;
-    this.lines.put(this.count++, x, y, z, x, y, ground, 1, colour, 0.45);
-    this.lines.put(
-      this.count++,
-      x - 0.3 * radius,
-      y,
-      ground,
-      x + 0.3 * radius,
-      y,
-      ground,
-      2,
-      colour,
-      0.8,
-    );
+    return radius;
   }
 }

@@ -11,6 +11,7 @@ import { useRestart } from "../../state/restarts.ts";
 import { useView } from "../../state/view.ts";
 import { SegmentLines } from "../lines/SegmentLines.ts";
 import { inMap } from "../stage/frames.ts";
+import { NearUavs } from "../stage/nearUavs.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { followTopics, type Follower } from "../stage/topics.ts";
 import { colourOf } from "./colours.ts";
@@ -22,6 +23,8 @@ const GOAL_PX = 4;
 /** Arms of the cross at a goal, m. */
 const GOAL_M = 0.4;
 const THROTTLE_MS = 200;
+/** Of the selected UAV and so many nearest to it. */
+const NEAREST = 100;
 
 interface Shown {
   points: Float64Array;
@@ -29,11 +32,12 @@ interface Shown {
   untilMs: number;
 }
 
-/** What UAVs mean to do: paths, trajectories and goals, in one draw call. */
+/** What UAVs near the selected one mean to do: paths, trajectories and goals, in one draw call. */
 export class Paths implements Part {
   readonly object = new Group();
   private readonly lines = new SegmentLines(SEGMENTS);
   private readonly paths = new Map<string, Shown>();
+  private readonly near = new NearUavs(NEAREST);
   private changed = false;
   private readonly follower: Follower;
   private readonly ends: readonly (() => void)[];
@@ -48,6 +52,7 @@ export class Paths implements Part {
       ],
       (topic, type) => {
         if (type === "geometry_msgs/msg/PoseStamped" && !/goal/.test(topic)) return null;
+        if (!this.near.includes(topic)) return null;
         return link.subscribe(topic, type, ({ message }) => this.take(topic, type, message), {
           throttleMs: THROTTLE_MS,
         });
@@ -67,6 +72,10 @@ export class Paths implements Part {
     const { paths } = useView.getState().show;
     this.follower.enable(paths);
     this.object.visible = paths;
+    if (paths && this.near.update(moment.nowMs)) {
+      this.follower.choose((topic) => this.near.includes(topic));
+      this.follower.look();
+    }
     for (const [topic, { untilMs }] of this.paths)
       if (moment.nowMs > untilMs) {
         this.paths.delete(topic);

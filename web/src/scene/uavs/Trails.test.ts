@@ -1,3 +1,4 @@
+import type { InstancedBufferGeometry, Mesh } from "three";
 import { beforeEach, expect, it, vi } from "vitest";
 
 type Listener = (received: { message: unknown }) => void;
@@ -19,6 +20,14 @@ type Moment = Parameters<InstanceType<typeof Trails>["update"]>[0];
 followRestarts();
 const clock = vi.spyOn(performance, "now");
 let nowMs = 0;
+
+/** Segments that are drawn, by their UAV's colour. */
+function drawnReds(trails: InstanceType<typeof Trails>): number {
+  const mesh = trails.object.children[0] as Mesh<InstancedBufferGeometry>;
+  const tint = mesh.geometry.getAttribute("tint");
+  const shown = Array.from({ length: mesh.geometry.instanceCount }, (_, i) => i);
+  return shown.filter((i) => tint.getX(i) === 1 && tint.getW(i) > 0).length;
+}
 
 /** Two UAVs fly along x, seen in a frame each tenth of a second. */
 function fly(trails: InstanceType<typeof Trails>, from: number, to: number): void {
@@ -51,6 +60,7 @@ it("the trail of a UAV that is put back to its start begins anew, that of anothe
   listeners.get("/volery/log")!({ message: { ...command, stamp, client: "" } });
   fly(trails, 10, 12.5); // in the half second that the picture needs there is no trail
   expect([trails.lengthOf("uav1"), trails.lengthOf("uav2")]).toEqual([0, 24]);
+  expect(drawnReds(trails)).toBe(0);
   fly(trails, 12.5, 20);
   expect(trails.lengthOf("uav2")).toBe(39);
   expect(trails.lengthOf("uav1")).toBeGreaterThan(10);
@@ -63,4 +73,37 @@ it("all trails begin anew with an epoch", () => {
   useEpoch.setState({ epoch: 7 });
   fly(trails, 0, 1);
   expect(trails.lengthOf("uav1")).toBe(1);
+});
+
+it("trails share their segments: a UAV that flies has those of one that stands", () => {
+  const trails = new Trails();
+  fly(trails, 0, 600); // two in step
+  expect([trails.lengthOf("uav1"), trails.lengthOf("uav2")]).toEqual([400, 400]);
+  for (let x = 600; x < 750; x += 0.5) {
+    shown.poses.set([x, 0, 2], 0);
+    trails.update({ nowMs: (nowMs += 100), width: 100, height: 100 } as Moment);
+  }
+  expect([trails.lengthOf("uav1"), trails.lengthOf("uav2")]).toEqual([550, 250]);
+  expect(drawnReds(trails)).toBe(550);
+});
+
+it("segments of a crowd are longer, so that its trails stay long", () => {
+  const [first] = fleet.uavs;
+  fleet.uavs = Array.from({ length: 1000 }, (_, row) => ({
+    ...first!,
+    name: `uav${row + 1}`,
+    row,
+  }));
+  fleet.version++;
+  shown.poses = new Float64Array(7000);
+  const trails = new Trails();
+  for (let frame = 0; frame < 400; frame++) {
+    for (let row = 0; row < 1000; row++) shown.poses[7 * row] = 0.15 * frame;
+    trails.update({ nowMs: (nowMs += 33), width: 100, height: 100 } as Moment);
+  }
+  expect(trails.lengthOf("uav1")).toBe(20);
+  const mesh = trails.object.children[0] as Mesh<InstancedBufferGeometry>;
+  const { start, end } = mesh.geometry.attributes;
+  expect(end!.getX(0) - start!.getX(0)).toBeCloseTo(0.6, 4);
+  expect(trails.lengthOf("uav1000")).toBe(20);
 });

@@ -23,6 +23,19 @@ export function shapeOf(airframe: string): AirframeShape {
   return ownEntry(AIRFRAMES, airframe) ?? AIRFRAMES.f450!;
 }
 
+const reaches = new Map<string, number>();
+
+/** From the middle of an airframe to the tips of its outermost rotor, m. */
+export function reachOf(airframe: string): number {
+  let reach = reaches.get(airframe);
+  if (reach === undefined) {
+    const { rotors, rotorRadius } = shapeOf(airframe);
+    reach = rotorRadius + Math.max(...rotors.map(([x, y]) => Math.hypot(x!, y!)));
+    reaches.set(airframe, reach);
+  }
+  return reach;
+}
+
 /**
  * Body, arms, motors and feet in one geometry with colours in its vertices; cameras and LIDARs
  * see the same one (src/volery/vehicle/body_shape.py).

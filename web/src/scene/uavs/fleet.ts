@@ -1,6 +1,8 @@
+import { uavColour } from "../../lib/uavColours.ts";
 import { link } from "../../link/link.ts";
+import { useColouring } from "../../state/colouring.ts";
 import { baseFrame, useVehicles } from "../../state/vehicles.ts";
-import { colourOf } from "./colours.ts";
+import { colourOf, linearOf } from "./colours.ts";
 
 export interface ShownUav {
   name: string;
@@ -12,6 +14,7 @@ export interface ShownUav {
   airborne: boolean;
   /** Fraction of full, mean over the rotors. */
   rotorSpeed: number;
+  /** Its own one, or what `coloured` UAVs have; linear. */
   colour: [number, number, number];
 }
 
@@ -24,15 +27,23 @@ export class ShownFleet {
   uavs: ShownUav[] = [];
   /** Grows when another UAV, row or airframe is in the list. */
   version = 0;
+  /** Whether the colours stand for something else than which UAV it is. */
+  coloured = false;
 
   private framesVersion = -1;
   private told: unknown = null;
+  private colouring: unknown = null;
+  private byName = new Map<string, ShownUav>();
 
   /** Whether the list is newer than before. */
   update(): void {
     const { list } = useVehicles.getState();
     const { version } = link.frames;
-    if (list === this.told && version === this.framesVersion) return;
+    const colouring = useColouring.getState();
+    if (list === this.told && version === this.framesVersion && colouring === this.colouring)
+      return;
+    this.colouring = colouring;
+    this.coloured = colouring.by !== "uav" && list.length > 0;
     this.told = list;
     this.framesVersion = version;
     const next = list.length > 0 ? fromVehicles() : fromFrames();
@@ -43,15 +54,17 @@ export class ShownFleet {
         return uav.name === old.name && uav.row === old.row && uav.airframe === old.airframe;
       });
     this.uavs = next;
+    this.byName = new Map(next.map((uav) => [uav.name, uav]));
     if (!alike) this.version++;
   }
 
   named(name: string): ShownUav | undefined {
-    return this.uavs.find((uav) => uav.name === name);
+    return this.byName.get(name);
   }
 }
 
 function fromVehicles(): ShownUav[] {
+  const { by, top, types } = useColouring.getState();
   return useVehicles.getState().list.map((vehicle, i) => ({
     name: vehicle.name,
     row: link.frames.row(baseFrame(vehicle.name)),
@@ -60,7 +73,7 @@ function fromVehicles(): ShownUav[] {
     crashed: vehicle.crashed === true,
     airborne: vehicle.airborne === true,
     rotorSpeed: Number.isFinite(vehicle.rotor_speed) ? vehicle.rotor_speed : 0,
-    colour: colourOf(i),
+    colour: by === "uav" ? colourOf(i) : linearOf(uavColour(vehicle, by, top, types)),
   }));
 }
 

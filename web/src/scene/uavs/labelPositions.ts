@@ -9,14 +9,14 @@ export interface Box {
 }
 
 /** More names than these only hide the picture. */
-const MOST = 48;
+export const MOST_LABELS = 48;
 const GAP_PX = 2;
 
 /** Ids of boxes none of which overlaps another, those of higher rank first. */
 export function chooseLabels(boxes: readonly Box[]): number[] {
   const kept: Box[] = [];
   for (const box of [...boxes].sort((a, b) => b.rank - a.rank)) {
-    if (kept.length >= MOST) break;
+    if (kept.length >= MOST_LABELS) break;
     if (!kept.some((other) => overlap(box, other))) kept.push(box);
   }
   return kept.map(({ id }) => id);

@@ -1,7 +1,8 @@
-"""A finished run as metrics see it.
+"""A finished run as metrics and expectations see it.
 
-A metric is a function whose parameters name what it needs: `flight`, `events`, `scenario`,
-`airframes`, `clearance`, `wall_s`, `estimates`, `simulation` or `log`.
+A function of the user is given what the names of its parameters ask for: `flight`, `events`,
+`scenario`, `airframes`, `clearance`, `wall_s`, `estimates`, `topics`, `simulation`, `log` or
+`verdicts`.
 """
 
 from __future__ import annotations
@@ -9,25 +10,40 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from volery.core.arrays import Array
 from volery.engine.events import Event
 from volery.results import FlightResult
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe
+from volery.verdicts.measures import nearest_obstacle
+from volery.verdicts.observing import Estimates, TopicRecord
+from volery.verdicts.verdict import Verdict
 from volery.world.scene import Scene
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
 
-CLEARANCE_REACH_M = 10.0
-"""Distance up to which obstacles are searched, m."""
-_BATCH = 4096
+GIVEN = (
+    "airframes",
+    "clearance",
+    "estimates",
+    "events",
+    "flight",
+    "log",
+    "scenario",
+    "simulation",
+    "topics",
+    "verdicts",
+    "wall_s",
+)
+"""Names of parameters that a function of the user may have."""
+NEEDS_SIMULATION = ("simulation", "estimates", "topics", "log")
+"""What a run among other environments does not have."""
 _STATES = (
     "position_map",
     "velocity_map",
@@ -37,13 +53,10 @@ _STATES = (
     "mode",
 )
 
-Estimates = Mapping[str, tuple[Array, Array]]
-"""By UAV: times (M,), s, and positions (M, 3), m, of its own pose estimate."""
-
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """What metrics may read of a run; its attributes are the names of their parameters."""
+    """What metrics and expectations may read of a run."""
 
     flight: FlightResult
     """States of the flight, sampled, and its world."""
@@ -59,8 +72,12 @@ class FinishedRun:
     """The simulation at its end; None: the run was an environment among others."""
     estimates: Estimates | None = None
     """Estimated trajectories; None: they were not recorded."""
+    topics: Mapping[str, TopicRecord] = field(default_factory=dict)
+    """Messages that expectations ask for, by topic."""
     log: Path | None = None
     """The closed log; None: there is none."""
+    verdicts: tuple[Verdict, ...] = ()
+    """Verdicts on the expectations of the scenario, if it was judged."""
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -70,19 +87,7 @@ class FinishedRun:
     @property
     def clearance(self) -> Callable[[], float]:
         """Function that returns the min distance, m, of any UAV to trees and solids."""
-        return lambda: clearance_m(self.flight, self.scene)
-
-
-def clearance_m(flight: FlightResult, scene: Scene) -> float:
-    """Returns the min distance, m, of any UAV to trees and solids, at most the searched one."""
-    points = flight.position_map.reshape(-1, 3)
-    points = np.ascontiguousarray(points[np.isfinite(points).all(axis=1)])
-    nearest = CLEARANCE_REACH_M
-    for start in range(0, len(points), _BATCH):
-        part = points[start : start + _BATCH]
-        found = scene.clearance(part, CLEARANCE_REACH_M, include_terrain=False)
-        nearest = min(nearest, float(found.distance.min(initial=CLEARANCE_REACH_M)))
-    return nearest
+        return lambda: nearest_obstacle(self.flight, self.scene).distance_m
 
 
 def digest_of(flight: FlightResult) -> str:
@@ -101,10 +106,6 @@ def digest_of(flight: FlightResult) -> str:
     return digest.hexdigest()
 
 
-NEEDS_SIMULATION = ("simulation", "estimates", "log")
-"""What a run among other environments does not have."""
-
-
 def arguments_of(run: FinishedRun, names: tuple[str, ...]) -> dict[str, Any]:
-    """Returns the arguments of a metric by the names of its parameters."""
+    """Returns the arguments of a function by the names of its parameters."""
     return {name: getattr(run, name) for name in names}

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volery.core import rotations
-from volery.report.alignment import at_times, ate_rmse_m, common_times, time_shift, umeyama
 from volery.report.trunks import TrunkMap, trunks_of_scan
+from volery.results.alignment import at_times, ate_rmse_m, common_times, time_shift, umeyama
 
 ANGLES = st.floats(-3.0, 3.0)
 

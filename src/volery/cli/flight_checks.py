@@ -1,0 +1,70 @@
+"""Verdicts on a flight of `volery run`, and what makes it fail for `--fail-on`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
+
+from volery.core.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
+    from volery.verdicts.flights import RunRecorder
+    from volery.verdicts.judging import Judge
+    from volery.verdicts.verdict import Verdict
+
+FAILED = 1
+"""Exit code of a flight that went through, but failed."""
+_KINDS = ("crash", "contact", "expectation")
+_CONTACTS = ("impact", "collision")
+
+
+def parse_failures(texts: Sequence[str]) -> frozenset[str]:
+    """Returns the kinds in texts such as `crash,contact`. Raises `ScenarioError` for others."""
+    kinds = [kind.strip() for text in texts for kind in text.split(",")]
+    for kind in kinds:
+        if kind not in _KINDS:
+            raise ScenarioError(f"--fail-on: {', '.join(_KINDS)}, not '{kind}'")
+    return frozenset(kinds)
+
+
+class FlightChecks:
+    """Checks a flight from now on; kinds: kinds of failures that count.
+
+    Raises `ScenarioError` if expectations count and the scenario has none, or if it names code that
+    may not run.
+    """
+
+    def __init__(self, simulation: Simulation, kinds: Collection[str]) -> None:
+        self._simulation, self._kinds = simulation, kinds
+        self._judge: Judge | None = None
+        self._recorder: RunRecorder | None = None
+        self._verdicts: tuple[Verdict, ...] = ()
+        if simulation.scenario.expect:
+            from volery.verdicts.flights import RunRecorder
+            from volery.verdicts.judging import Judge
+
+            self._judge = Judge(simulation.scenario)
+            self._recorder = RunRecorder(simulation, self._judge.needs)
+        elif "expectation" in kinds:
+            raise ScenarioError("--fail-on expectation: the scenario expects nothing: [[expect]]")
+
+    def judge(self, wall_s: float) -> tuple[Verdict, ...]:
+        """Ends the recording and returns the verdicts; wall_s: wall time of the flight, s."""
+        if self._judge is not None and self._recorder is not None:
+            self._recorder.stop()
+            self._verdicts = self._judge.verdicts(self._recorder.finished(wall_s))
+        return self._verdicts
+
+    def failures(self) -> list[str]:
+        """Returns what has failed, a line each."""
+        counts, simulation = "expectation" in self._kinds, self._simulation
+        failures = [v.describe() for v in self._verdicts if counts and not v.is_passed]
+        if "crash" in self._kinds:
+            crashed = [name for name, uav in simulation.uavs.items() if uav.crashed]
+            failures += [f"{name} has crashed" for name in crashed]
+        if "contact" in self._kinds:
+            contacts = (e for e in simulation.diagnostics.events if str(e.kind) in _CONTACTS)
+            first = next(contacts, None)
+            failures += [] if first is None else [f"first contact: {first.describe()}"]
+        return failures

@@ -1,0 +1,248 @@
+"""`volery test`: exit codes, reports, what failed flights leave, and bad input."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import CliRunner
+
+from volery.cli.app import app
+
+HOP = """
+name = "hop"
+duration_s = {seconds}
+[world.wind]
+velocity_m_s = [1.0, 0.0, 0.0]
+turbulence = "light"
+[types.bird]
+airframe = "f450"
+[types.bird.flight]
+take_off_altitude_m = 2.0
+[[types.bird.sensors]]
+kind = "odometry"
+[[uavs]]
+type = "bird"
+count = 2
+position_m = [0.0, 0.0]
+last_position_m = [4.0, 0.0]
+on_start = "take_off"
+[[expect]]
+kind = "no_contact"
+"""
+FAST = '[[expect]]\nkind = "speed"\nat_most_m_s = {limit}\n'
+ON_TOPIC = '[[expect]]\nkind = "topic_rate"\ntopic = "odom"\nat_least_hz = 45\n'
+
+
+def test(*words):
+    """Runs the command in this process."""
+    return CliRunner().invoke(app, ["test", *map(str, words)])
+
+
+test.__test__ = False
+
+
+@pytest.fixture
+def hop(tmp_path, monkeypatch):
+    """Writes scenarios below an empty working folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(more="", seconds=3.0, name="hop.toml"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(HOP.format(seconds=seconds) + more)
+        return path
+
+    return write
+
+
+def test_flights_that_pass(hop, tmp_path):
+    path = hop(ON_TOPIC)
+    done = test(path, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert f"{path}  .  " in done.output
+    assert re.search(r"^1 flight passed in \d+\.\d s$", done.output, re.MULTILINE)
+    assert re.search(r"[\d.]+ Hz +odom >= 45 Hz \(seed 1\)", done.output)
+    assert not list((tmp_path / "out").rglob("*.mcap"))
+
+
+def test_a_failed_flight_can_be_repeated(hop, tmp_path):
+    path = hop(FAST.format(limit=0.5))
+    done = test(path, "--seeds", 2, "--jobs", 1, "--out", tmp_path / "out")
+    assert done.exit_code == 1, done.output
+    assert f"{path}  FF  " in done.output
+    assert "2 of 2 flights failed" in done.output
+    assert f"FAILED {path}, seed 2" in done.output
+    second = done.output[done.output.index(f"FAILED {path}, seed 2") :]
+    failed = re.search(r"failed +speed .*: ([\d.]+) m/s \(uav\d at ([\d.]+) s\)", second)
+    assert float(failed[1]) > 0.5
+    (replay,) = re.findall(r"replay +(volery run .* --seed 2 .*)", done.output)
+    words = shlex.split(replay)[1:-1]  # without --page
+    assert words[:2] == ["run", str(path)]
+    assert float(words[words.index("--seconds") + 1]) > float(failed[2])
+    again = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
+    assert again.exit_code == 1, again.output
+    assert failed[0].removeprefix("failed").strip() in again.output
+    logs = re.findall(r"log +(\S+\.mcap)", done.output)
+    from volery.logs import open_log
+
+    assert len(logs) == 2
+    assert open_log(logs[0])["/uav1/odom"]["pose.pose.position.z"].max() > 1.0
+    fewer = test(path, "--no-logs", "--out", tmp_path / "out")
+    assert "log  " not in fewer.output
+    assert not list((tmp_path / "out").rglob("*.mcap"))
+
+
+def test_verdicts_as_json_are_the_same_with_more_processes(hop, tmp_path):
+    path = hop(FAST.format(limit=0.5) + ON_TOPIC, seconds=1.0)
+    options = "--seeds", 3, "--no-logs", "--json", "--out"
+    one = json.loads(test(path, "--jobs", 1, *options, tmp_path / "one").stdout)
+    two = json.loads(test(path, "--jobs", 2, *options, tmp_path / "two").stdout)
+    assert [flight["seed"] for flight in one["scenarios"][0]["flights"]] == [1, 2, 3]
+    assert not one["passed"]
+    pairs = [flights["scenarios"][0]["flights"] for flights in (one, two)]
+    for first, second in zip(*pairs, strict=True):
+        assert first["digest"] == second["digest"]
+        assert first["verdicts"] == second["verdicts"]
+    digests = {flight["digest"] for flight in one["scenarios"][0]["flights"]}
+    assert len(digests) == 3
+
+
+def test_values_are_drawn_for_each_seed(hop, tmp_path):
+    path = hop(FAST.format(limit=0.5), seconds=1.5)
+    vary = "--vary", "wind=2:8", "--vary", "types.bird.flight.take_off_altitude_m=1:2"
+    options = "--json", "--jobs", 1, "--out", tmp_path / "out"
+    many = json.loads(test(path, *vary, "--seeds", 3, *options).stdout)
+    flights = many["scenarios"][0]["flights"]
+    winds = [flight["changes"]["wind"][0] for flight in flights]
+    assert len(set(winds)) == 3
+    assert all(2.0 < wind < 8.0 for wind in winds)
+    assert len({flight["digest"] for flight in flights}) == 3
+    alone = json.loads(test(path, *vary, "--seeds", 1, "--first-seed", 3, *options).stdout)
+    assert alone["scenarios"][0]["flights"][0]["changes"] == flights[2]["changes"]
+    assert alone["scenarios"][0]["flights"][0]["digest"] == flights[2]["digest"]
+    replay = shlex.split(alone["scenarios"][0]["flights"][0]["replay"])
+    again = CliRunner().invoke(app, [*replay[1:-1], "--fail-on", "expectation"])
+    assert again.exit_code == 1, again.output
+    (failed,) = [v for v in flights[2]["verdicts"] if v["outcome"] == "failed"]
+    assert failed["text"] in again.output
+
+
+def test_a_folder_holds_tests_and_other_files(hop, tmp_path):
+    hop(seconds=0.5, name="suite/a.toml")
+    hop(FAST.format(limit=0.01), seconds=0.5, name="suite/deep/b.toml")
+    hop(name="suite/other.toml").write_text("[tool]\nname = 'x'\n")
+    (tmp_path / "suite" / "broken.toml").write_text("= 3")
+    done = test(tmp_path / "suite", "--no-logs", "--junit", tmp_path / "new" / "out.xml")
+    assert done.exit_code == 1, done.output
+    root = ElementTree.parse(tmp_path / "new" / "out.xml").getroot()
+    suites = {suite.get("name").rpartition("/")[2]: suite for suite in root}
+    assert sorted(suites) == ["a.toml", "b.toml"]
+    assert (suites["a.toml"].get("tests"), suites["a.toml"].get("failures")) == ("1", "0")
+    assert (suites["b.toml"].get("tests"), suites["b.toml"].get("failures")) == ("2", "1")
+    failure = suites["b.toml"].find("testcase/failure")
+    assert failure.get("type") == "speed"
+    assert "replay  volery run" in failure.text
+
+
+def test_junit_is_read_by_others(hop, tmp_path):
+    junitparser = pytest.importorskip("junitparser")
+    path = hop(FAST.format(limit=0.01), seconds=0.5)
+    test(
+        path, "--seeds", 2, "--no-logs", "--junit", tmp_path / "out.xml", "--out", tmp_path / "out"
+    )
+    (suite,) = junitparser.JUnitXml.fromfile(str(tmp_path / "out.xml"))
+    assert (suite.tests, suite.failures, suite.errors) == (4, 2, 0)
+    results = [result for case in suite for result in case.result]
+    assert [type(result) for result in results] == [junitparser.Failure] * 2
+    assert all("speed <= 0.01 m/s" in result.message for result in results)
+
+
+def test_a_node_that_fails_is_an_error_of_its_flight(hop, tmp_path):
+    (tmp_path / "own_nodes.py").write_text(
+        "from volery import Node\n"
+        "class Breaks(Node):\n"
+        "    def __init__(self, **options):\n"
+        "        super().__init__('breaks', **options)\n"
+        "        self.create_timer(0.2, self.on_timer)\n"
+        "    def on_timer(self):\n"
+        "        raise RuntimeError('a <reason>')\n"
+    )
+    path = hop('[[nodes]]\nnode = "own_nodes:Breaks"\n')
+    untrusted = test(path)
+    assert untrusted.exit_code == 2
+    assert "give --trust" in untrusted.stderr
+    junit = tmp_path / "out.xml"
+    done = test(path, "--trust", "--no-logs", "--junit", junit, "--out", tmp_path / "out")
+    assert done.exit_code == 1, done.output
+    assert f"{path}  E  " in done.output
+    assert "a <reason>" in done.output
+    case = ElementTree.parse(junit).getroot().find("testsuite/testcase")
+    assert "a <reason>" in case.find("error").get("message")
+
+
+def test_a_search_saves_a_scenario_that_fails(hop, tmp_path):
+    pytest.importorskip("optuna")
+    path = hop(FAST.format(limit=1.6))  # a take-off reaches 1.4 m/s, in a wind of 14 m/s 1.9
+    words = "--vary", "wind=0:14", "--search", 60, "--jobs", 1, "--out", tmp_path / "out"
+    done = test(path, *words)
+    assert done.exit_code == 1, done.output
+    assert re.search(r"a failure after \d+ flights?", done.output)
+    (saved,) = re.findall(r"saved +(\S+\.toml)", done.output)
+    again = test(saved, "--no-logs", "--json")
+    assert again.exit_code == 1
+    (flight,) = json.loads(again.stdout)["scenarios"][0]["flights"]
+    (failed,) = [v for v in flight["verdicts"] if v["outcome"] == "failed"]
+    assert failed["text"] in done.output
+    assert failed["margin"] > -0.1  # the wind is hardly stronger than needed
+    calm = test(path, "--vary", "wind=0:0.5", "--search", 3, "--json", *words[4:])
+    assert calm.exit_code == 0
+    assert json.loads(calm.stdout)[0]["failure"] is None
+
+
+def test_a_flight_that_never_ends_is_ended(hop, tmp_path):
+    (tmp_path / "endless.py").write_text(
+        "from volery import Node\n"
+        "class Endless(Node):\n"
+        "    def __init__(self, **options):\n"
+        "        super().__init__('endless', **options)\n"
+        "        self.create_timer(0.5, self.on_timer)\n"
+        "    def on_timer(self):\n"
+        "        while True:\n"
+        "            pass\n"
+    )
+    path = hop('[[nodes]]\nnode = "endless:Endless"\n')
+    done = test(path, "--trust", "--no-logs", "--timeout", 5, "--out", tmp_path / "out")
+    assert done.exit_code == 1, done.output
+    assert f"{path}  E  " in done.output
+
+
+BAD = {
+    ("hop.toml", "--search", "5"): "--search needs --vary KEY=LOW:HIGH or --seeds N",
+    ("nothing",): "no scenario, file or folder 'nothing'",
+    ("hovr",): "did you mean 'hover'?",
+    ("hop.toml", "--vary", "wind"): "--vary: KEY=LOW:HIGH, such as wind=0:6, not 'wind'",
+    ("hop.toml", "--vary", "wind=3:1"): "3 must be below 1",
+    ("hop.toml", "--vary", "wand=1:3"): "wand",
+    ("empty.toml",): "expects nothing: add [[expect]]",
+    ("none",): "no .toml file in this folder has [[expect]]",
+    ("unknown.toml",): "did you mean 'no_contact'?",
+    ("hop.toml", "--junit", "none"): "cannot be written",
+    ("hop.toml", "--seconds", "0"): "duration_s",
+}
+
+
+@pytest.mark.parametrize("words", BAD, ids=" ".join)
+def test_bad_input_is_one_line(hop, tmp_path, words):
+    path = hop(seconds=0.1)
+    text = path.read_text()
+    (tmp_path / "empty.toml").write_text(text[: text.index("[[expect]]")])
+    (tmp_path / "unknown.toml").write_text(text.replace("no_contact", "no_contacts"))
+    (tmp_path / "none").mkdir()
+    done = test(*words)
+    assert done.exit_code == 2, done.output
+    assert BAD[words] in done.stderr
+    assert done.stderr.count("\n") == 1
