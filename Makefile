@@ -78,6 +78,7 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 
 test-installation: $(VENV)/.installed-tests page # whatever the tests need
 	@.ci/install_ros1
+	@.ci/install_bubblewrap
 	@.ci/install_browser
 
 test-page-units:

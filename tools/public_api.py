@@ -28,7 +28,14 @@ from pydantic_core import PydanticUndefined
 
 from volery.core.attribute_docs import attribute_docs
 
-MODULES = ("volery", "volery.logs", "volery.results", "volery.scenario", "volery.verdicts")
+MODULES = (
+    "volery",
+    "volery.grading",
+    "volery.logs",
+    "volery.results",
+    "volery.scenario",
+    "volery.verdicts",
+)
 HANDLES: dict[str, tuple[str, ...]] = {
     "volery.engine.events:Event": (),
     "volery.engine.events:EventKind": (),

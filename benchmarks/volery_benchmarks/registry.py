@@ -372,6 +372,29 @@ BENCHES: dict[str, Bench] = {
             has_parts=True,
         ),
         Bench(
+            "verdicts",
+            "Scenario tests: `hover` with five expectations again and again while two processes "
+            "burn the cores, and in other processes; flights of a minute through forests by LIDAR; "
+            "CPU time of `forest_survey` with ten expectations; flights until a search finds a "
+            "gust that blows an avoiding UAV into a tree (`search_found`: share of 20 searches "
+            "that take at most 200), beside random values; 30 submissions graded, three of them "
+            "hostile",
+            {
+                "verdicts_that_differ": Bound(0.0, at_most=True),
+                "digests_that_differ": Bound(0.0, at_most=True),
+                "replays_equal": Bound(3.0),
+                "avoidance_minutes": Bound(20.0, at_most=True),
+                "overhead_of_ten": Bound(0.02, at_most=True),
+                "search_found": Bound(1.0),
+                "random_to_search": Bound(2.0),
+                "grading_minutes": Bound(10.0, at_most=True),
+                "graded_as_alone": Bound(27.0),
+            },
+            in_all=False,  # it takes hours, and needs the extra "search"
+            has_quick=True,
+            has_parts=True,
+        ),
+        Bench(
             "cluster",
             "Studies of many runs: `hover` for 5 s, 1,000 seeds; runs per second of CPU time of "
             "driver and worker, without the start of the processes; each run a simulation of its "

@@ -153,12 +153,15 @@ def _kept(
     """Writes the log of a failed flight, which is flown again for it, and a map of its paths."""
     from volery.cluster.single_runs import SingleRun
     from volery.runtime.flight_recorder import DEFAULT_RATE_HZ
+    from volery.verdicts.judging import Judge
+    from volery.verdicts.pictures import failure_png
 
     folder: Path = item.config.rootpath / item.config.getoption("--volery-out")
     folder.mkdir(parents=True, exist_ok=True)
     name = _UNSAFE.sub("_", item.nodeid).strip("_")[-120:]
     log, picture = folder / f"{name}.mcap", folder / f"{name}.png"
-    with SingleRun(scenario, DEFAULT_RATE_HZ, log, ()) as run:
+    judge = Judge(scenario)
+    with SingleRun(scenario, DEFAULT_RATE_HZ, log, judge.needs, judge) as run:
         run.fly()
-    picture.write_bytes(judged.flight._repr_png_())
+    picture.write_bytes(failure_png(judged.flight, judged.verdicts))
     return (("log", log), ("picture", picture))

@@ -23,6 +23,7 @@ import { hideToken } from "./state/token.ts";
 import { followTopics } from "./state/topics.ts";
 import { followFaults } from "./state/faults.ts";
 import { welcome } from "./state/welcome.ts";
+import { followVerdicts } from "./state/verdicts.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 hideToken(location, history);
@@ -32,6 +33,7 @@ connectAsAddressed(location, useOperator.getState().wished);
 followDisconnection();
 followSimulation(useConnection.getState().volery);
 followFaults();
+followVerdicts();
 followVehicles(useConnection.getState().volery);
 followHealth();
 followJournal();

@@ -15,5 +15,6 @@ def bound_unsent(sock: socket.socket) -> None:
     Bytes in transit to a reader are not limited. Connections that a listening socket accepts
     inherit the limit.
     """
-    if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+    is_tcp = sock.family in (socket.AF_INET, socket.AF_INET6)
+    if is_tcp and hasattr(socket, "TCP_NOTSENT_LOWAT"):
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MAX_UNSENT_BYTES)

@@ -25,7 +25,7 @@ from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand, ServeCommand
 from volery.cli.radio_commands import comms, gcs
-from volery.cli.study_commands import judge, sweep
+from volery.cli.study_commands import grade, judge, sweep
 from volery.cli.terminal import echo_lines
 
 app = typer.Typer(
@@ -73,6 +73,7 @@ for _command in (
     worker,
     play,
     sweep,
+    grade,
     info,
     report,
     slam,

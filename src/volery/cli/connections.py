@@ -31,7 +31,7 @@ _AGAIN_S = 0.2
 def open_link(via: str, name: str) -> GraphConnection:
     """Joins the graph at `via` under a node name. Raises `BridgeError` if no server answers."""
     scheme, _, rest = via.partition("://")
-    if scheme in ("rosbridge", "ws", "wss"):
+    if scheme in ("rosbridge", "ws", "wss", "unix"):
         from volery.bridges.rosbridge.client import RosbridgeClient
 
         url = via if scheme != "rosbridge" else f"ws://{rest}"

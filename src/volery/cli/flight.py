@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -117,6 +117,7 @@ class CommandLineFlight:
         self._wall_s = self._before_s = 0.0
         self._log: LogWriter | None = None
         self._recorded: Subscription | None = None
+        self._is_recorded: Callable[[str], bool] = lambda _topic: False
         self._collector: FlightCollector | None = None
         self._checks = FlightChecks(simulation, options.fail_on)
         if options.digest:
@@ -130,6 +131,7 @@ class CommandLineFlight:
             from volery.bridges.logs.recorded_topics import recorded_topics
 
             matches = recorded_topics(simulation.graph, options.topics, options.exclude)
+            self._is_recorded = matches
             warn_of_size(simulation.diagnostics.image_rates, matches)
             self._log = create_log(options.record, overwrite=options.overwrite)
             self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
@@ -141,11 +143,15 @@ class CommandLineFlight:
         """
         code = 0
         problem = ""
+        verdicts: Sequence[Verdict] = ()
         start = time.perf_counter()
         try:
             with self._keys:
                 self._await_clients()
                 self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
+            self._wall_s = self._wall_since(start)
+            verdicts = self._checks.judge(self._wall_s)
+            self._log_verdicts()
         except _StoppedError:
             code, problem = stopped_code(), f"Stopped {stopped_how()}"
         except RecordingError as error:
@@ -155,11 +161,10 @@ class CommandLineFlight:
             code, problem = USER_ERROR, "The flight ended with an error"
             complain_of(error)
         finally:
-            self._wall_s = time.perf_counter() - start - self._simulation.clock.paused_s
+            self._wall_s = self._wall_s or self._wall_since(start)
             closed = self._close_log()
         self._progress.finish(self._simulation.time_s)
         self._tell_flight(problem)
-        verdicts = () if problem else self._checks.judge(self._wall_s)
         for verdict in verdicts:
             echo_line(f"  {verdict.outcome!s:7} {verdict.describe()}")
         if not closed and not code:
@@ -172,6 +177,16 @@ class CommandLineFlight:
         if not code and self._options.page is not None and not self._options.exit_at_end:
             self._stay()
         return FAILED if failures else code
+
+    def _wall_since(self, start: float) -> float:
+        """Returns the wall time since `start` without pauses, s."""
+        return time.perf_counter() - start - self._simulation.clock.paused_s
+
+    def _log_verdicts(self) -> None:
+        """Adds the verdicts to the log, for playback."""
+        message = self._checks.message
+        if self._log is not None and message is not None and self._is_recorded(message.topic):
+            self._log.write(message)
 
     def _await_clients(self) -> None:
         """Waits for clients and applies `--start-paused` before the first step."""
@@ -193,10 +208,14 @@ class CommandLineFlight:
         try:
             with self._keys:
                 while not simulation.clock.quitting:
-                    simulation.wait_at_end(self._stop_if_pressed)
+                    simulation.wait_at_end(self._look_at_end)
                     simulation.run(speed=simulation.clock.speed, on_progress=self._on_progress)
         except _StoppedError:
             return
+
+    def _look_at_end(self) -> None:
+        self._stop_if_pressed()
+        self._checks.look()
 
     def _stop_if_pressed(self) -> None:
         if self._interrupts.pressed:
@@ -204,6 +223,7 @@ class CommandLineFlight:
 
     def _on_progress(self, progress: Any) -> None:
         self._stop_if_pressed()
+        self._checks.look()
         for key in self._keys.pressed():
             steer(self._simulation.clock, key, progress.real_time_factor)
         self._before_s = progress.before_s

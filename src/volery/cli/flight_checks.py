@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from volery.core.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from volery.graph.messages import Published
     from volery.runtime.simulation import Simulation
-    from volery.verdicts.flights import RunRecorder
-    from volery.verdicts.judging import Judge
+    from volery.verdicts.live_verdicts import LiveVerdicts
     from volery.verdicts.verdict import Verdict
 
 FAILED = 1
@@ -37,24 +37,30 @@ class FlightChecks:
 
     def __init__(self, simulation: Simulation, kinds: Collection[str]) -> None:
         self._simulation, self._kinds = simulation, kinds
-        self._judge: Judge | None = None
-        self._recorder: RunRecorder | None = None
+        self._live: LiveVerdicts | None = None
         self._verdicts: tuple[Verdict, ...] = ()
         if simulation.scenario.expect:
-            from volery.verdicts.flights import RunRecorder
-            from volery.verdicts.judging import Judge
+            from volery.verdicts.live_verdicts import LiveVerdicts
 
-            self._judge = Judge(simulation.scenario)
-            self._recorder = RunRecorder(simulation, self._judge.needs)
+            self._live = LiveVerdicts(simulation)
         elif "expectation" in kinds:
             raise ScenarioError("--fail-on expectation: the scenario expects nothing: [[expect]]")
 
+    def look(self) -> None:
+        """Publishes the verdicts so far to clients that receive them; call it between ticks."""
+        if self._live is not None:
+            self._live.look()
+
     def judge(self, wall_s: float) -> tuple[Verdict, ...]:
         """Ends the recording and returns the verdicts; wall_s: wall time of the flight, s."""
-        if self._judge is not None and self._recorder is not None:
-            self._recorder.stop()
-            self._verdicts = self._judge.verdicts(self._recorder.finished(wall_s))
+        if self._live is not None:
+            self._verdicts = self._live.finish(wall_s)
         return self._verdicts
+
+    @property
+    def message(self) -> Published | None:
+        """The verdicts as a message for the log; None without expectations."""
+        return None if self._live is None else self._live.last
 
     def failures(self) -> list[str]:
         """Returns what has failed, a line each."""

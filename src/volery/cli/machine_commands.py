@@ -11,9 +11,9 @@ from volery.cli.error_reporting import guarded
 
 _BENCHES = (
     "lidar, fleet, camera, dynamics, reset, start, bridge, ros2, coverage, avoidance, search, "
-    "mavlink, comms, page, forest_search, load, hostile, cluster, swarm, learning, peers"
+    "mavlink, comms, page, forest_search, load, hostile, cluster, swarm, verdicts, learning, peers"
 )
-_QUICK = "lidar, forest_search, load, hostile, cluster, swarm"
+_QUICK = "lidar, forest_search, load, hostile, cluster, swarm, verdicts"
 
 
 @guarded
@@ -33,7 +33,10 @@ def bench(
         bool, typer.Option("--quick", help=f"Run the short version of {_QUICK}.")
     ] = False,
     only: Annotated[
-        str, typer.Option(help="Measure these parts of swarm or learning, separated by commas.")
+        str,
+        typer.Option(
+            help="Measure these parts of swarm, verdicts or learning, separated by commas."
+        ),
     ] = "",
 ) -> None:
     """Measure how fast Volery is on this machine."""

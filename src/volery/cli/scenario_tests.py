@@ -77,6 +77,12 @@ class TestedFlight:
     """Log of a failed flight."""
 
     @property
+    def picture(self) -> Path | None:
+        """Map of the paths around the moment of the failure."""
+        file = None if self.log is None else self.log.with_suffix(".png")
+        return file if file is not None and file.exists() else None
+
+    @property
     def verdicts(self) -> list[Verdict]:
         """Verdicts on the expectations; empty for a flight that ended with an error."""
         return [Verdict.from_data(each) for each in self.result.verdicts]

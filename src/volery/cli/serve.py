@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
     from volery.server.settings import PageSettings
+    from volery.verdicts.live_verdicts import LiveVerdicts
 
 _log = logging.getLogger(__name__)
 
@@ -128,6 +129,8 @@ class _Host:
         self._is_unasked = options.page.unasked
         """Whether no client has chosen the world that is built next."""
         self._first_flight: FirstFlight | None = None
+        self._verdicts: LiveVerdicts | None = None
+        """Verdicts of the present flight; None: its scenario expects nothing."""
 
     @property
     def goes_on(self) -> bool:
@@ -176,6 +179,7 @@ class _Host:
                 echo_line(f"flying  {scenario.name}", err=True)
                 self._first_flight = FirstFlight(simulation) if self._is_unasked else None
                 self._is_unasked = False
+                self._verdicts = _verdicts_of(simulation)
                 self._stay(simulation)
                 self._first_flight = None
             self._quits = simulation.clock.quitting and not self._wish.asked
@@ -213,6 +217,8 @@ class _Host:
         try:
             while not simulation.clock.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
+                if self._verdicts is not None and not simulation.clock.quitting:
+                    self._verdicts.finish()
                 simulation.wait_at_end(self._look)
                 speed = simulation.clock.speed  # also where it was set at the end
         except _StoppedError:
@@ -224,6 +230,8 @@ class _Host:
             raise _StoppedError
         if self._first_flight is not None:
             self._first_flight.look()
+        if self._verdicts is not None:
+            self._verdicts.look()
 
     def _wait(self) -> None:
         """Runs the bridges without a world."""
@@ -250,6 +258,15 @@ def _first_scenario(options: RunOptions) -> Scenario:
         seconds=options.seconds,
         seed=options.seed,
     )
+
+
+def _verdicts_of(simulation: Simulation) -> LiveVerdicts | None:
+    """Returns what judges a flight; None if its scenario expects nothing."""
+    if not simulation.scenario.expect:
+        return None
+    from volery.verdicts.live_verdicts import LiveVerdicts
+
+    return LiveVerdicts(simulation)
 
 
 def named_problem(name: str, what: str) -> str:

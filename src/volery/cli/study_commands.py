@@ -145,3 +145,32 @@ def judge(
         passed = report_search(options, search, sampler, as_json=as_json)
     if not passed:
         raise typer.Exit(1)
+
+
+@guarded
+def grade(
+    assignment: Annotated[Path, typer.Argument(help="Assignment (.toml).")],
+    submissions: Annotated[
+        Path, typer.Argument(help="Folder of submissions, or one of them (.py or a folder).")
+    ],
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, max=1024, help="Set the number of flights at a time; default: cores."),
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the points as a table.")
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a page with points and verdicts.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all verdicts as JSON.")] = False,
+    traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
+) -> None:
+    """Fly nodes of students with the same seeds and give points for the expectations.
+
+    Each node runs in a process of limited time and memory, under bubblewrap without access to other
+    files and networks. The scenario of the assignment is trusted, submissions are not.
+    """
+    from volery.cli.grade import GradeOptions, report_grades
+
+    report_grades(GradeOptions(assignment, submissions, jobs, csv, html), as_json=as_json)

@@ -172,8 +172,8 @@ def _print_failure(path: str, flight: TestedFlight) -> None:
 
 
 def _hints(flight: TestedFlight) -> list[str]:
-    hints = [f"replay  {flight.replay}"] if flight.replay else []
-    return hints + ([f"log     {flight.log}"] if flight.log is not None else [])
+    found = {"replay": flight.replay, "log": flight.log, "picture": flight.picture}
+    return [f"{word:7} {what}" for word, what in found.items() if what]
 
 
 def _ended(flight: TestedFlight) -> Verdict:
@@ -211,6 +211,7 @@ def _plain(flight: TestedFlight) -> dict[str, Any]:
         "wall_s": result.wall_s,
         "replay": flight.replay,
         "log": None if flight.log is None else str(flight.log),
+        "picture": None if flight.picture is None else str(flight.picture),
     }
 
 

@@ -25,6 +25,7 @@ from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
 from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, digest_of
 from volery.verdicts.judging import Judge
+from volery.verdicts.pictures import failure_png
 
 _DISK_FULL = os.strerror(errno.ENOSPC)
 _OF_SENSORS = {"simulation", "estimates", "topics"}
@@ -134,12 +135,16 @@ class RunWorker:
         log = self._job.results / f"{run.id}.partial.mcap" if needs_log else None
         kept = f"logs/{run.id}.mcap" if keeps_log else ""
         try:
-            scenario, lean, _ = self._scenarios(run.values)
+            scenario, lean, judge = self._scenarios(run.values)
             needs_sensors = batch.plain or needs_log or _OF_SENSORS & self._needs
             chosen = (scenario if needs_sensors else lean).model_copy(update={"seed": run.seed})
             rate_hz = self._study.sample_rate_hz
-            with SingleRun(chosen, rate_hz, log, self._needs) as flight:
-                result = self._measured(run, flight.fly(), kept)
+            with SingleRun(chosen, rate_hz, log, self._needs, judge) as flight:
+                flown = flight.fly()
+                result = self._measured(run, flown, kept)
+            if keeps_log and judge is not None and not result.is_passed:
+                picture = failure_png(flown.flight, flown.verdicts)
+                (self._job.results / f"{run.id}.png").write_bytes(picture)
         except Exception as error:
             if _is_disk_full(error):
                 raise DiskFullError(f"{self._job.results}: {_DISK_FULL}") from None
@@ -155,7 +160,7 @@ class RunWorker:
         values: dict[str, float] = {}
         judge = self._scenarios(run.values)[2]
         try:
-            if judge is not None:
+            if judge is not None and not flown.verdicts:  # flown among other environments
                 flown = replace(flown, verdicts=judge.verdicts(flown))
             for metric in self._metrics:
                 values.update(metric.values(flown))

@@ -30,8 +30,11 @@ from volery.core.connection_limits import SHARED, ConnectionLimits
 from volery.core.pending_connections import Look, PendingConnection, PendingConnections
 from volery.core.rare_log import RareLog
 
+UNIX = "unix:"
+"""Prefix of a host that is the path of a Unix-domain socket."""
 MAX_UNPROVEN = 64
 """Limit of one listener's connections without a valid frame (modelling choice)."""
+_UNIX_FAMILY = getattr(socket, "AF_UNIX", None)
 _BACKLOG = 128
 _REFUSALS_A_TURN = 64
 _READY_A_TURN = 4
@@ -100,7 +103,8 @@ class Listener(socket.socket):
 
     def add_port(self) -> None:
         """Adds the port to the name in logs."""
-        self._name = f"{self._name}, port {self.getsockname()[1]}"
+        if self.family != _UNIX_FAMILY:
+            self._name = f"{self._name}, port {self.getsockname()[1]}"
 
     def fileno(self) -> int:
         """Returns the descriptor that is readable when `accept` has work to do."""
@@ -202,7 +206,7 @@ class Listener(socket.socket):
             self._refuse_blindly()
             return None
         accepted = _Accepted(self.family, self.type, self.proto, fileno=descriptor)
-        reason = self._enter(accepted, str(address[0]))
+        reason = self._enter(accepted, str(address[0]) if address else UNIX)
         if reason is not None:
             self._note(f"refuses connections: there are {reason}")
             accepted.close()
@@ -300,11 +304,17 @@ def open_listener(
 ) -> Listener:
     """Returns a socket that listens on the first address of `host`; port 0 takes a free one.
 
-    Names such as `localhost` mean IPv4 if they have such an address. The other arguments are those
-    of `Listener`. Raises `OSError` or `OverflowError` if the socket cannot listen.
+    Names such as `localhost` mean IPv4 if they have such an address; `unix:PATH` is a Unix-domain
+    socket, which has no port. The other arguments are those of `Listener`. Raises `OSError` or
+    `OverflowError` if the socket cannot listen.
     """
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    family: int
+    address: Any
+    if host.startswith(UNIX):
+        family, address = socket.AF_UNIX, host.removeprefix(UNIX)
+    else:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
     listener = Listener(family, name, limits, max_connections, max_unproven, opening)
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

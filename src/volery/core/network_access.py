@@ -53,7 +53,12 @@ def write_while_open(transport: asyncio.WriteTransport, data: bytes) -> None:
 
 
 def tend(sock: socket.socket) -> None:
-    """Sends small messages at once, and detects a peer that vanished silently."""
+    """Sends small messages at once, and detects a peer that vanished silently.
+
+    A Unix-domain socket does so by itself.
+    """
+    if sock.family not in (socket.AF_INET, socket.AF_INET6):
+        return
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in PROBES.items():

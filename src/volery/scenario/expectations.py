@@ -45,11 +45,27 @@ class _Expectation(Data):
             words += f" ({', '.join(self.uavs)})"
         return words
 
+    def may_recover(self, time_s: float) -> bool:
+        """Returns whether a flight that fails at a simulated time, s, may still pass.
+
+        This is so for what is to happen once, and for what is judged by the whole flight.
+        """
+        by_s: float | None = getattr(self, "by_s", None)
+        return by_s is None or time_s < by_s
+
     def _words(self) -> str:
         return str(getattr(self, "kind", ""))
 
 
-class _Windowed(_Expectation):
+class _Always(_Expectation):
+    """An expectation that holds throughout the flight."""
+
+    def may_recover(self, time_s: float) -> bool:  # noqa: ARG002
+        """Returns False: it has failed for good."""
+        return False
+
+
+class _Windowed(_Always):
     """An expectation that holds at all samples of a part of the flight."""
 
     from_s: SimulatedTime = 0.0
@@ -64,7 +80,7 @@ class _Windowed(_Expectation):
         return self
 
 
-class ContactFreeExpectation(_Expectation):
+class ContactFreeExpectation(_Always):
     """No UAV touches a tree, a solid or another UAV, or hits the ground."""
 
     kind: Literal["no_contact"] = "no_contact"
@@ -74,7 +90,7 @@ class ContactFreeExpectation(_Expectation):
         return "no contact"
 
 
-class CrashFreeExpectation(_Expectation):
+class CrashFreeExpectation(_Always):
     """No UAV crashes; a contact that it survives is allowed."""
 
     kind: Literal["no_crash"] = "no_crash"
@@ -211,6 +227,10 @@ class TopicRateExpectation(_Windowed):
     window_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 1.0
     """Length of the windows, which follow each other."""
 
+    def may_recover(self, time_s: float) -> bool:
+        """Returns whether the first window is not over yet."""
+        return time_s < self.from_s + self.window_s
+
     def _words(self) -> str:
         return f"{self.topic} >= {self.at_least_hz:g} Hz"
 
@@ -242,6 +262,10 @@ class TopicValueExpectation(_Windowed):
         if self.at_least is not None and self.at_most is not None:
             _check_order((self.at_least, self.at_most), "at_least and at_most")
         return self
+
+    def may_recover(self, time_s: float) -> bool:
+        """Returns whether a value can still come that passes."""
+        return self.when != "always" and (self.until_s is None or time_s < self.until_s)
 
     def _words(self) -> str:
         parts = [f"= {self.equals}"] if self.equals is not None else []
@@ -300,7 +324,7 @@ class NeesExpectation(_Expectation):
         return f"{low}NEES <= {self.at_most:g}"
 
 
-class LogMessageExpectation(_Expectation):
+class LogMessageExpectation(_Always):
     """No node logs a warning or worse."""
 
     kind: Literal["no_log_message"] = "no_log_message"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.runtime.build.node_loading import find_function
-from volery.scenario.expectations import PredicateExpectation, names_of
+from volery.scenario.expectations import Expectation, PredicateExpectation, names_of
 from volery.scenario.schema import Scenario
 from volery.verdicts import path_checks, topic_checks
 from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of
@@ -73,9 +74,22 @@ class Judge:
             needs |= {name for name in predicate.needs if name in NEEDS_SIMULATION}
         return frozenset(needs)
 
-    def verdicts(self, run: FinishedRun) -> tuple[Verdict, ...]:
-        """Returns a verdict for each expectation; never raises for one that cannot be judged."""
-        return tuple(self._verdict(run, number, name) for number, name in enumerate(self.names))
+    def verdicts(self, run: FinishedRun, *, is_over: bool = True) -> tuple[Verdict, ...]:
+        """Returns a verdict for each expectation; never raises for one that cannot be judged.
+
+        is_over: whether the run has ended; if not, failures that the rest of the flight may mend
+        are pending.
+        """
+        found = tuple(self._verdict(run, number, name) for number, name in enumerate(self.names))
+        if is_over:
+            return found
+        time_s = float(run.flight.times_s[-1])
+        return tuple(
+            replace(verdict, outcome=Outcome.PENDING)
+            if _may_change(verdict, expectation, time_s)
+            else verdict
+            for verdict, expectation in zip(found, self.expectations, strict=True)
+        )
 
     def _verdict(self, run: FinishedRun, number: int, name: str) -> Verdict:
         expectation = self.expectations[number]
@@ -88,6 +102,17 @@ class Judge:
             text = " ".join(str(error).split())
             return Verdict(name, expectation.kind, Outcome.ERROR, text)
         return Verdict.of(name, expectation.kind, finding)
+
+
+def _may_change(verdict: Verdict, expectation: Expectation, time_s: float) -> bool:
+    """Returns whether the rest of a flight may turn a failure into a pass.
+
+    What has no moment, such as a topic without messages, is not decided yet.
+    """
+    if verdict.is_passed:
+        return False
+    undecided = verdict.outcome is Outcome.ERROR or math.isnan(verdict.time_s)
+    return undecided or expectation.may_recover(time_s)
 
 
 class _Predicate(NamedTuple):

@@ -169,7 +169,10 @@ def _pose_receiver(rows: list[Array]) -> Any:
         row[4:8] = turn.x, turn.y, turn.z, turn.w
         if has_covariance:
             row[8:] = np.reshape(message.pose.covariance, (6, 6))[:3, :3].ravel()
-        if np.isfinite(row[:8]).all() and (not rows or time_s > rows[-1][0]):
-            rows.append(row)
+        if not np.isfinite(row[:8]).all() or (rows and time_s == rows[-1][0]):
+            return
+        while rows and rows[-1][0] > time_s:  # of a flight that a reset or a snapshot has undone
+            rows.pop()
+        rows.append(row)
 
     return receive

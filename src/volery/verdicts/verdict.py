@@ -24,6 +24,8 @@ class Outcome(StrEnum):
     """It did not."""
     ERROR = "error"
     """It could not be judged."""
+    PENDING = "pending"
+    """During a flight: it may still do what was expected."""
 
 
 @dataclass(frozen=True)

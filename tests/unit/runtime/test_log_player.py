@@ -305,3 +305,26 @@ def test_what_cannot_be_played(tmp_path):
     strings(path, [0, 10])
     with pytest.raises(CommandError, match="speed"):
         LogPlayer(path, speed=-1.0)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_verdicts_of_the_whole_flight_hold_at_all_times(tmp_path, suffix):
+    """They are the last message of the log; clients receive them from the start, and once."""
+    path = tmp_path / f"judged{suffix}"
+    log = create_log(path)
+    verdicts = m.Published("/volery/verdicts", "std_msgs/msg/String", 2 * 10**9, m.String("[3]"))
+    for second in range(3):
+        log.write(m.Published("/count", "std_msgs/msg/Bool", second * 10**9, m.Bool(True)))
+    log.write(verdicts)
+    log.close()
+    with LogPlayer(path, paused=True) as player:
+        box = Visitor(player).listen("/volery/verdicts")
+        player.wait(0.0)
+        assert [published.message.data for published in box.take()] == ["[3]"]
+        assert player.time_s == 0.0
+        player.seek(1.5)
+        player.set_speed(None)
+        player.resume()
+        play_out(player)
+        player.wait(0.0)
+        assert box.take() == []

@@ -6,6 +6,9 @@ import { clockText } from "../lib/time.ts";
 import { closeRecording, PLAYING, seek, setLoop, setPlaying, setSpeed } from "../link/commands.ts";
 import { succeeds } from "../state/notices.ts";
 import { usePlayer } from "../state/player.ts";
+import { failuresOf } from "../lib/verdicts.ts";
+import { useVerdicts } from "../state/verdicts.ts";
+import { Expectations } from "./Expectations.tsx";
 import classes from "./PlayerBar.module.css";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 0];
@@ -15,6 +18,7 @@ const STEP_S = 0.1;
 /** While a recorded log is shown: play, pause, where in it, how fast. */
 export function PlayerBar() {
   const { player } = usePlayer();
+  const verdicts = useVerdicts();
   const [dragged, setDragged] = useState<number | null>(null);
   const seeking = useMemo(() => new Latest(seek, SEEK_MS), []);
   if (player === null) return null;
@@ -40,6 +44,8 @@ export function PlayerBar() {
         value={dragged ?? player.position}
         thumbLabel="Playback time"
         label={(time) => clockText(time - player.start)}
+        marks={failuresOf(verdicts).map((value) => ({ value }))}
+        classNames={{ mark: classes.failure ?? "" }}
         onChange={(time) => {
           setDragged(time);
           seeking.offer(time);
@@ -49,6 +55,7 @@ export function PlayerBar() {
       <Text size="sm" ff="monospace" c="dimmed">
         {clockText(player.end - player.start)}
       </Text>
+      <Expectations />
       <Group gap={4} wrap="nowrap">
         <Select
           size="xs"

@@ -23,6 +23,8 @@ LATCHED = ("/tf_static", "/map", "/weather", "/volery/scenario", "/robot_descrip
 """Topics whose last message is sent to later subscribers."""
 LEFT_OUT = ("/clock", "/volery/player/**")
 """Topics that the playing graph publishes itself."""
+OF_WHOLE_FLIGHT = ("/volery/verdicts",)
+"""Topics about a whole flight: their last message holds at all times."""
 HAPPENINGS = ("/events", "/volery/log", "/rosout", "/**/events")
 """Topics of events, whose last message is not a state that still holds."""
 
@@ -65,23 +67,36 @@ class Playback:
         self._publishers: dict[int, Publisher] = {}
         self._is_latched = topic_filter(LATCHED)
         self._happens = topic_filter(HAPPENINGS)
+        self._is_of_whole_flight = topic_filter(OF_WHOLE_FLIGHT)
+        self._whole: set[int] = set()
+        """Channels of topics about the whole flight."""
         self._listeners: dict[str, int] = {}
         self._graph: Graph
 
     def open(self, graph: Graph) -> None:
-        """Advertises the log's topics on a graph whose time is `now_ns`."""
+        """Advertises the log's topics on a graph whose time is `now_ns`.
+
+        Publishes what holds for the whole flight.
+        """
         self._graph = graph
         is_played = topic_filter(("/**",), LEFT_OUT)
         for channel, topic in self.log.topics.items():
             if not is_played(topic.topic):
                 continue
+            is_whole = self._is_of_whole_flight(topic.topic)
             try:
                 msgtype = self._decoder.type_of(topic)
                 self._publishers[channel] = graph.advertise(
-                    topic.topic, msgtype, latched=self._is_latched(topic.topic)
+                    topic.topic, msgtype, latched=is_whole or self._is_latched(topic.topic)
                 )
             except GraphError as error:
                 self.refused.setdefault(topic.topic, str(error))
+                continue
+            if is_whole:
+                self._whole.add(channel)
+        if self._whole:
+            self._publish(self._line.last_before(self._line.end, self._whole))
+            self._set_clock()
 
     @cached_property
     def topics(self) -> tuple[PlayedTopic, ...]:
@@ -137,7 +152,8 @@ class Playback:
     # ------------------------------------------------------------------------------------ inside
 
     def _wanted(self) -> Set[int]:
-        return {c for c, publisher in self._publishers.items() if publisher.has_subscribers}
+        wanted = {c for c, publisher in self._publishers.items() if publisher.has_subscribers}
+        return wanted - self._whole
 
     def _show(self, channels: Set[int]) -> None:
         """Publishes the last messages of `channels` before the current position."""

@@ -69,6 +69,11 @@ class Timeline:
         self.start_ns = min((piece.start_ns for piece in self._pieces), default=0)
         self.end_ns = self._ends[-1] if self._pieces else 0
 
+    @property
+    def end(self) -> TimelinePosition:
+        """Position after the last message."""
+        return TimelinePosition(len(self._pieces), 0)
+
     def shift_ns(self, place: TimelinePosition) -> int:
         """Returns the offset of the line to the log's own time, before a position."""
         number = min(place.piece, len(self._pieces) - 1)

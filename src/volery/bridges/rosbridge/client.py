@@ -30,6 +30,7 @@ from volery.graph.session import SessionInfo
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 5.0
 _KEEPALIVE_S = 20.0
+_UNIX, _LOCAL = "unix://", "ws://localhost/"
 
 
 class RosbridgeClient(RemoteClient):
@@ -38,7 +39,7 @@ class RosbridgeClient(RemoteClient):
     Parameters
     ----------
     url
-        `ws://host:port/path` or `wss://...`.
+        `ws://host:port/path` or `wss://...`; `unix://` and the path of a Unix-domain socket.
     name
         Name of the client, for messages.
     token
@@ -68,10 +69,11 @@ class RosbridgeClient(RemoteClient):
         max_message_bytes: int = MOST_MESSAGE_BYTES,
         generation: Generation = "ros2",
     ) -> None:
-        if not url.startswith(("ws://", "wss://")):
+        self._socket = url.removeprefix(_UNIX) if url.startswith(_UNIX) else None
+        if self._socket is None and not url.startswith(("ws://", "wss://")):
             raise _no_address(url)
         try:
-            parse_uri(url)
+            parse_uri(_LOCAL if self._socket else url)
         except (InvalidURI, ValueError):
             raise _no_address(url) from None
         super().__init__(name, url)
@@ -124,8 +126,10 @@ class RosbridgeClient(RemoteClient):
             await asyncio.sleep(pause_s)
 
     async def _connect_once(self) -> None:
+        at = {} if self._socket is None else {"unix": True, "path": self._socket}
         async with connect(
-            self.url,
+            _LOCAL if at else self.url,
+            **at,
             subprotocols=[CBOR_PROTOCOL],  # type: ignore[list-item]
             compression=None,
             max_size=self._most_bytes,

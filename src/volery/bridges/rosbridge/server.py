@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from http import HTTPStatus
 from typing import Any
@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
+from volery.bridges.rosbridge.access_policy import AccessPolicy
 from volery.bridges.rosbridge.fair_queue import FairQueue
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
@@ -29,7 +30,7 @@ from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
-from volery.core.listener import Listener, Opening, open_listener
+from volery.core.listener import UNIX, Listener, Opening, open_listener
 from volery.core.network_access import LOOPBACK, check_address, check_token, shows_token, tend
 from volery.core.pending_connections import look_at_http
 from volery.core.rare_log import RepeatFilter
@@ -73,7 +74,8 @@ class RosbridgeServer:
     Parameters
     ----------
     host, port
-        Listening address; port 0 takes a free port, see `port`.
+        Listening address; port 0 takes a free port, see `port`. `unix:PATH` is a Unix-domain
+        socket, which only programs that may open the path can reach.
     path
         The only path served, such as `/rosbridge`; None: every path.
     token
@@ -90,6 +92,8 @@ class RosbridgeServer:
         Further accepted web origins, such as `https://studio.example.org`.
     keepalive_s
         Time between two pings, and timeout of an answer; None: no pings.
+    gate
+        Makes the access policy of a new client; None: no restrictions.
 
     """
 
@@ -105,6 +109,7 @@ class RosbridgeServer:
         origins: Sequence[str] = (),
         keepalive_s: float | None = 20.0,
         parameters: Parameters | None = None,
+        gate: Callable[[], AccessPolicy] | None = None,
     ) -> None:
         self.host = host
         self.port = port
@@ -116,6 +121,7 @@ class RosbridgeServer:
         self._origins = Origins(origins, token_needed=bool(token))
         self._keepalive_s = keepalive_s
         self._parameters = parameters
+        self._gate = gate
         self._server: Server | None = None
         self._listener: Listener | None = None
         self._attempts = TokenAttempts()
@@ -133,8 +139,15 @@ class RosbridgeServer:
     @property
     def name(self) -> str:
         """Name and address of the bridge."""
+        if self._is_local:
+            return f"rosbridge {self.host}"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"rosbridge ws://{host}:{self.port}{self._path or ''}"
+
+    @property
+    def _is_local(self) -> bool:
+        """Whether it listens on a Unix-domain socket."""
+        return self.host.startswith(UNIX)
 
     @property
     def clients(self) -> int:
@@ -150,8 +163,9 @@ class RosbridgeServer:
             The address is taken, not this machine's, or beyond loopback without consent and token.
 
         """
-        check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
-        check_token(self.host, self._token)
+        if not self._is_local:
+            check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
+            check_token(self.host, self._token)
         graph = gateway.graph
         self._gateway = gateway
         self._shared = ServerContext(
@@ -180,7 +194,8 @@ class RosbridgeServer:
                 f"rosbridge cannot listen on {self.host}:{self.port}: {error.strerror or error}; "
                 f"end the program that has the port, or choose another: --bridge rosbridge=PORT"
             ) from None
-        self.port = next(iter(self._server.sockets)).getsockname()[1]
+        if not self._is_local:
+            self.port = next(iter(self._server.sockets)).getsockname()[1]
         self._rosapi = RosApi(gateway, self._generation, graph.now_ns, self._parameters)
         self._rosapi.start()
         self._transforms = TfRepublisher(gateway)
@@ -289,6 +304,7 @@ class RosbridgeServer:
             wake=bell.ring,
             post=post_to(loop),
             authorized=connection in self._shown,
+            gate=None if self._gate is None else self._gate(),
         )
         peer.on_authorized = lambda: _allow(connection)
         self._clients.add(connection)

@@ -5,6 +5,7 @@ import { PLAYING, setPlaying } from "../../link/commands.ts";
 import { attempt } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { useSimulation } from "../../state/simulation.ts";
+import { Expectations } from "../Expectations.tsx";
 import { Snapshots } from "./Snapshots.tsx";
 import { Reset } from "./Reset.tsx";
 import { Speed } from "./Speed.tsx";
@@ -19,6 +20,7 @@ export function TimeControls() {
       <PlayPause />
       <Steps />
       <Clock />
+      <Expectations />
       <Speed />
       <Reset />
       <Snapshots />

@@ -4,9 +4,8 @@ import { memo, useState } from "react";
 import { matcher } from "../../lib/filter.ts";
 import { clockText } from "../../lib/time.ts";
 import { clearJournal, useJournal, type Entry, type EntrySort } from "../../state/journal.ts";
-import { select, useVehicles } from "../../state/vehicles.ts";
-import { look } from "../../state/view.ts";
 import { FilterInput } from "../shared/FilterInput.tsx";
+import { JumpTo } from "../shared/JumpTo.tsx";
 import classes from "./Log.module.css";
 
 const SORTS = [
@@ -92,22 +91,3 @@ const Row = memo(function Row({ entry }: { entry: Entry }) {
     </div>
   );
 });
-
-/** Name of a UAV; a click follows it. */
-function JumpTo({ uav }: { uav: string }) {
-  const known = useVehicles(({ list }) => list.some(({ name }) => name === uav));
-  if (!known) return <span>{uav}</span>;
-  return (
-    <Button
-      size="compact-xs"
-      variant="subtle"
-      aria-label={`Go to ${uav}`}
-      onClick={() => {
-        select(uav);
-        look("chase");
-      }}
-    >
-      {uav}
-    </Button>
-  );
-}
