@@ -357,12 +357,15 @@ BENCHES: dict[str, Bench] = {
             "into a new one after one or two have landed; `games_...`: games that the search wins "
             "against an attacker; crowds of 30 to 100 F450s by three behaviours: `..._collisions`: "
             "runs in which a UAV touches something, `..._arrived`: share of runs in which all "
-            "others arrive within 150 s; 100 runs by ORCA, 10 by each other one",
+            "others arrive within 150 s; 100 runs by ORCA, 10 by each other one; flocks with "
+            "contacts and downwash at 1 kHz, 1,000 UAVs and the largest number in real time",
             {
                 "ares_success": Bound(0.97),
                 "ares_s_mean": Bound(10.0, at_most=True),
                 "recovery_s_one_lost": Bound(20.0, at_most=True),
                 "recovery_success_one_lost": Bound(0.95),
+                "swarm_1000_realtime_factor": Bound(8.0),
+                "realtime_uavs_state": Bound(4000.0),
                 "circle_swap_orca_collisions": Bound(0.0, at_most=True),
                 "crossing_streams_orca_collisions": Bound(0.0, at_most=True),
                 "forest_passage_orca_collisions": Bound(0.0, at_most=True),

@@ -21,6 +21,7 @@ from volery.core.arrays import Array
 from volery.core.machine import usable_cores
 from volery_benchmarks import crowds, formation_games
 from volery_benchmarks.formation_flight import fly
+from volery_benchmarks.large_swarms import measure_real_time
 from volery_benchmarks.registry import chosen_parts
 
 _LOG = logging.getLogger(__name__)
@@ -109,6 +110,7 @@ PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
     "plans": _plans,
     "flights": _flights,
     "games": _games,
+    "scale": measure_real_time,
     **{situation: partial(_crowd, situation) for situation in crowds.SITUATIONS},
 }
 """Functions of the parts; their argument is `quick`."""

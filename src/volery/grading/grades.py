@@ -57,7 +57,7 @@ class Grade:
 
     @property
     def total(self) -> float:
-        """Sum of the points."""
+        """Sum of the points over all expectations."""
         return sum(self.points.values())
 
     @property
