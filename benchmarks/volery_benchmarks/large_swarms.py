@@ -1,7 +1,7 @@
 """Measures how many flocking UAVs fly in real time, in full physics.
 
-F450s with contacts and downwash at 1 kHz on all threads, 6 m apart at first, flock in an arena as in
-G. Vasarhelyi et al. (Science Robotics, 2018), twenty commands a second.
+F450s with contacts and downwash at 1 kHz on all threads, 6 m apart at first, flock in an arena as
+in G. Vasarhelyi et al. (Science Robotics, 2018), twenty commands a second.
 """
 
 from __future__ import annotations

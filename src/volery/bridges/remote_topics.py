@@ -29,7 +29,7 @@ class Subscription:
 class RemoteTopics(ABC):
     """Holds advertisements and subscriptions, also without a connection.
 
-    A subclass implements the protocol: the `_tell_...` methods send a change to the server, with
+    A subclass implements the protocol: the `_send_...` methods send a change to the server, with
     the lock held, and do nothing without a connection; `_send` sends a message.
 
     Parameters

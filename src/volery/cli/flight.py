@@ -164,7 +164,7 @@ class CommandLineFlight:
             self._wall_s = self._wall_s or self._wall_since(start)
             closed = self._close_log()
         self._progress.finish(self._simulation.time_s)
-        self._tell_flight(problem)
+        self._print_flight(problem)
         for verdict in verdicts:
             echo_line(f"  {verdict.outcome!s:7} {verdict.describe()}")
         if not closed and not code:
@@ -245,7 +245,7 @@ class CommandLineFlight:
 
     def _write_report(self, interrupted: str, verdicts: Sequence[Verdict]) -> bool:
         if self._collector is None or self._options.report is None:
-            self._tell_files(None)
+            self._print_files(None)
             return True
         from volery.core.machine import describe_machine, describe_versions
         from volery.report.page import write_report
@@ -267,10 +267,10 @@ class CommandLineFlight:
         except VoleryError as error:
             complain(str(error))
         self._progress.note("")
-        self._tell_files(path)
+        self._print_files(path)
         return path is not None
 
-    def _tell_flight(self, problem: str) -> None:
+    def _print_flight(self, problem: str) -> None:
         simulated = self._simulation.time_s
         factor = (self._before_s + simulated) / self._wall_s if self._wall_s > 0.0 else 0.0
         count = len(self._simulation.uavs)
@@ -304,7 +304,7 @@ class CommandLineFlight:
         simulation = self._simulation
         return simulation.scenario.ends_when == "all_landed" and not simulation.clock.quitting
 
-    def _tell_files(self, report: Path | None) -> None:
+    def _print_files(self, report: Path | None) -> None:
         if self._log is not None:
             size = self._log.path.stat().st_size / 1e6
             messages = counted(self._log.messages, "message")

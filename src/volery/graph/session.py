@@ -179,7 +179,7 @@ class Gateway:
                 del self.commanded_ns[next(iter(self.commanded_ns))]
 
     def _note_refused(self, refusal: Refusal) -> None:
-        """Records that a client's message is not obeyed, and tells the client."""
+        """Records that a client's message is refused, and reports it to the client."""
         client, topic, msgtype, reason = refusal
         with suppress(GraphError):  # the run has ended
             self.watch(ClientCommand(client, "refused", topic, msgtype, reason))

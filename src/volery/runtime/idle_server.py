@@ -1,4 +1,4 @@
-"""What clients meet while no world is loaded: a graph with the services that make sense then."""
+"""Serves clients while no world is loaded: a graph with the services that need none."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _SRV = "simulation_interfaces/srv"
 
 
 class IdleServer:
-    """Stands behind the bridges between two simulations, in the state NO_WORLD.
+    """Serves the bridges between two simulations, in the state NO_WORLD.
 
-    Clients can ask for features, state and worlds, load one, or quit. Its owner calls `wait` until
-    `on_load` was called or it is `quitting`.
+    Clients can request features, state and worlds, load a world, or quit. Its owner calls `wait`
+    until `on_load` is called or `quitting` is set.
     """
 
     scenario = geometry = operators = None
@@ -38,7 +38,7 @@ class IdleServer:
         offer_result(self.graph, "/set_simulation_state", put, self._set_state)
 
     def wait(self, timeout_s: float) -> None:
-        """Serve clients for up to so long, or until the next of them came."""
+        """Serves clients for a wall time, s, or until the next request."""
         self._inbox.wait(timeout_s)
         self._inbox.work_off()
         self.graph.deliver()

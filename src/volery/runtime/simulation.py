@@ -52,7 +52,7 @@ from volery.runtime.monitoring.status import StatusSources
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.replay.command_repeater import CommandRepeater
 from volery.runtime.replay.command_replay import CommandReplay
-from volery.runtime.replay.scenario_record import tell_origin
+from volery.runtime.replay.scenario_record import publish_origin
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.services.recording import RecordingServices
 from volery.runtime.services.service_set import open_services
@@ -140,7 +140,7 @@ class Simulation(Uncopied):
             engine, self._loop, connected.outlet.events, self._look, self._check_open
         )
         self.commands = CommandLog(graph, engine, self._end.refusal)
-        tell_origin(graph, scenario)
+        publish_origin(graph, scenario)
         world_topic = WorldTopic(graph, lambda: self.geometry)
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
         self._manager = manager = build_vehicles(scenario, connected, world, self._runs, partition)

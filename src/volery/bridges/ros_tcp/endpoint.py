@@ -45,7 +45,7 @@ class RosTcpEndpoint:
     host, port
         Listening address; port 0 takes a free port, see `port`.
     generation
-        Encoding of payloads: "ros1" or "ros2". The handshake tells the clients.
+        Encoding of payloads: "ros1" or "ros2". The handshake contains it.
     anywhere
         Allows a `host` beyond loopback: the protocol carries no password.
     most_payload_bytes

@@ -1,7 +1,7 @@
 """Encodes rosbridge v2 frames: operations as JSON text, as CBOR, inside PNG images.
 
 An operation is a dict with the key `op`. A text frame contains JSON, a binary frame CBOR or, from
-clients such as ROS#, JSON in UTF-8; the first byte tells them apart. Large
+clients such as ROS#, JSON in UTF-8; the first byte distinguishes them. Large
 operations may be sent as a PNG image or in fragments (`bridges.rosbridge.fragments`).
 """
 
@@ -25,7 +25,7 @@ Frame = str | bytes
 Operation = dict[str, Any]
 
 CBOR_PROTOCOL = "rosbridge-cbor"
-"""WebSocket subprotocol that tells a client that it may send CBOR."""
+"""WebSocket subprotocol of clients that may send CBOR."""
 MOST_MESSAGE_BYTES = 64 * 1024 * 1024
 """Largest message that a client accepts from a server; `message_budget` has the limits of servers.
 """

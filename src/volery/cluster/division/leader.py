@@ -82,7 +82,7 @@ class Member:
             yield self._history.read(int.from_bytes(self._history.read(_SIZE_BYTES), "big"))
 
     def update(self, due: int, news: dict[str, Any]) -> None:
-        """Takes over what a worker tells of itself."""
+        """Takes over a worker's description of itself."""
         self.due = due
         if news:
             self.topics, self.services = news["topics"], news["services"]
@@ -277,7 +277,7 @@ class Leader:
 
 
 def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
-    """Waits until a worker is ready; returns what it tells of itself: see `Member.update`.
+    """Waits until a worker is ready; returns its description: see `Member.update`.
 
     Raises `DivisionError` if its part cannot start.
     """

@@ -138,7 +138,7 @@ def set_current(context: AutopilotContext, _source: Source, message: Any) -> Non
 
 
 def jump_to(context: AutopilotContext, sequence: int, *, resets: bool = True) -> bool:
-    """Makes an item the current one and tells it; returns whether the item exists.
+    """Makes an item the current one and announces it; returns whether the item exists.
 
     resets: whether jumps start to count anew.
     """

@@ -29,7 +29,7 @@ A_TICK = 2
 
 def send_list(context: AutopilotContext, source: Source, _message: Any) -> None:
     """Starts to send all values on the link, the check value first."""
-    _tell_check(context, source[0])
+    _send_check(context, source[0])
     context.links.open[source[0]].parameters_to_send = list(reversed(range(len(NAMES))))
 
 
@@ -45,11 +45,11 @@ def send_one(context: AutopilotContext, source: Source, message: Any) -> None:
     if 0 <= index < len(NAMES):
         name = NAMES[index]
     if index < 0 and name == CHECK:
-        _tell_check(context, source[0])
+        _send_check(context, source[0])
     elif index < len(NAMES) and name in DEFAULTS:
         _tell(context, source[0], name)
     else:
-        _tell_fault(context, source, "" if index >= 0 else name, _DOES_NOT_EXIST, index)
+        _send_fault(context, source, "" if index >= 0 else name, _DOES_NOT_EXIST, index)
 
 
 def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
@@ -60,11 +60,11 @@ def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
     name = message.param_id
     if name == CHECK:  # a client whose list is up to date cancels it
         context.links.open[source[0]].parameters_to_send = []
-        _tell_fault(context, source, name, _READ_ONLY)
+        _send_fault(context, source, name, _READ_ONLY)
         return
     if name not in DEFAULTS:
         context.say(4, f"unknown param: {name}")
-        _tell_fault(context, source, name, _DOES_NOT_EXIST)
+        _send_fault(context, source, name, _DOES_NOT_EXIST)
         return
     value = from_wire(message.param_type, message.param_value)
     fault, why = 0, ""
@@ -74,7 +74,7 @@ def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
         fault = _READ_ONLY if DEFAULTS[name].fixed else _OUT_OF_RANGE
     if fault or value is None:
         context.say(4, why)
-        _tell_fault(context, source, name, fault)
+        _send_fault(context, source, name, fault)
         _tell(context, source[0], name)
         return
     context.memory.parameters[name] = value
@@ -83,7 +83,7 @@ def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
         _tell(context, number, name)
 
 
-def _tell_fault(
+def _send_fault(
     context: AutopilotContext, source: Source, name: str, fault: int, index: int = -1
 ) -> None:
     """Sends PARAM_ERROR, which pymavlink has since 2025."""
@@ -93,7 +93,7 @@ def _tell_fault(
         context.links.send(message(system, component, name.encode(), index, fault), link)
 
 
-def _tell_check(context: AutopilotContext, link: int) -> None:
+def _send_check(context: AutopilotContext, link: int) -> None:
     check = struct.pack("<I", check_of(context.memory.parameters))
     message = dialect().MAVLink_param_value_message
     context.links.send(

@@ -37,7 +37,7 @@ def set_interval(context: AutopilotContext, source: Source, command: Command) ->
 
 def get_interval(context: AutopilotContext, source: Source, command: Command) -> int:
     """Handles GET_MESSAGE_INTERVAL: answers with MESSAGE_INTERVAL; -1: not sent."""
-    return _tell_interval(context, source, command.params[0])
+    return _send_interval(context, source, command.params[0])
 
 
 def send(context: AutopilotContext, source: Source, command: Command) -> int:
@@ -49,7 +49,7 @@ def send(context: AutopilotContext, source: Source, command: Command) -> int:
     if whom == _EVERYONE:
         source = (ALL_LINKS, *source[1:])
     if round(number) == telemetry.MESSAGE_INTERVAL:
-        return _tell_interval(context, source, what)
+        return _send_interval(context, source, what)
     if round(number) == dialect_extensions.AvailableModes.id:
         return _send(context, source, dialect_extensions.available_modes(what))
     return _send_built(context, source, round(number))
@@ -66,7 +66,7 @@ def _send_built(context: AutopilotContext, source: Source, number: int) -> int:
     return _send(context, source, [] if message is None else [message])
 
 
-def _tell_interval(context: AutopilotContext, source: Source, number: float) -> int:
+def _send_interval(context: AutopilotContext, source: Source, number: float) -> int:
     if not (math.isfinite(number) and 0 <= round(number) <= 65535):
         return DENIED
     link = context.links.open.get(source[0])

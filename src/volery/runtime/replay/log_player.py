@@ -1,11 +1,11 @@
-"""A recorded log in the place of a simulation: a graph that tells again what was told then.
+"""Plays a recorded log in place of a simulation, on a graph of its own.
 
     with LogPlayer(Path("flight.mcap")) as player, BridgeHost(player.gateway) as bridges:
         bridges.open(RosbridgeServer())
         player.run()
 
-It has its own clock, the log's, which can be paused, paced and put anywhere. Nothing is simulated:
-what clients command has no effect.
+Its clock is that of the log; it can be paused, paced and set to any time. Nothing is simulated:
+commands of clients have no effect.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 
 _SLICE_S = 0.004
-"""Wall time between two looks at what is due, while it plays."""
+"""Wall time between two checks for due messages during playback, s."""
 _CLOCK_S = 0.02
 _STATE_S = 0.2
-"""Wall time between two messages."""
+"""Wall time between two messages, s."""
 _SLACK_S = 0.25
-"""Who falls behind by more does not rush afterwards to catch up."""
+"""Greatest lag, s of wall time, that playback makes up for; beyond, due times move."""
 _GLANCE_S = 0.05
 _NEWCOMERS = "new subscribers"
 
@@ -40,14 +40,13 @@ _NEWCOMERS = "new subscribers"
 class LogPlayer(PlaybackControl):
     """Plays the log at `path` on a graph of its own.
 
-    `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
-    the end, else it pauses there. `on_load` is called with the name of a scenario that a client
-    wants to see flown instead, or with None where it wants no world; `on_close` where a client
-    wants to return to what was flown before. `shelf` has what there is to choose from. `own`: the
-    user's own scenario of the log's flight, for files that its world needs; unless given, one of
-    that name of the shelf; else they lie beside the log. Methods belong to one thread, which calls
-    `wait` or `run`; others use `Gateway.post`. Raises `RecordingError` where there is no log, or
-    nothing in it.
+    speed: factor of real time; None: as fast as possible. loop: whether playback starts over at the
+    end; else it pauses there. on_load: called with the name of a scenario that a client requests,
+    or with None for no world. on_close: called when a client closes the log. shelf: scenarios and
+    logs that clients can choose. own: the user's own scenario of the log's flight, for files that
+    its world needs; None: the shelf's scenario of that name, or files beside the log. Methods
+    belong to one thread, which calls `wait` or `run`; others use `Gateway.post`. Raises
+    `RecordingError` if there is no log, or no message in it.
     """
 
     operators = None
@@ -75,7 +74,7 @@ class LogPlayer(PlaybackControl):
             is_late=lambda: self._is_late,
         )
         self._budget = CallBudget()
-        """For reading the log again, for all new subscribers together."""
+        """Budget for reading the log for new subscribers, all together."""
         self._clock = self.graph.advertise("/clock", Clock)
         self._playback.open(self.graph)
         self._services = PlayerServices(self, on_load, shelf, on_close)
@@ -89,9 +88,9 @@ class LogPlayer(PlaybackControl):
         *,
         on_progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        """Play and serve for `seconds` of wall time, None: until somebody quits.
+        """Plays and serves clients for `seconds` of wall time; None: until `quit`.
 
-        `on_progress` is called about twenty times a second, also while it stands still.
+        on_progress: called about twenty times a second, also during a pause.
         """
         begun = time.perf_counter()
         until = math.inf if seconds is None else begun + seconds
@@ -104,13 +103,13 @@ class LogPlayer(PlaybackControl):
                 on_progress(Progress(self.time_s - start_s, span_s, wall_s, self._paused))
 
     def wait(self, timeout_s: float) -> None:
-        """Play and serve clients for so long."""
+        """Plays and serves clients for a wall time, s."""
         until = time.perf_counter() + timeout_s
         while True:
             self._serve()
             self._show_to_newcomers()
             self._play()
-            self._tell()
+            self._publish_state()
             self.graph.deliver()
             left = until - time.perf_counter()
             if left <= 0.0 or self.quitting:
@@ -118,7 +117,7 @@ class LogPlayer(PlaybackControl):
             self._inbox.wait(min(left, _STATE_S if self._paused else self._pause_s))
 
     def close(self) -> None:
-        """Close the log."""
+        """Closes the log."""
         self.quitting = True
         self._playback.close()
 
@@ -132,27 +131,27 @@ class LogPlayer(PlaybackControl):
 
     @property
     def _pause_s(self) -> float:
-        """Between two looks while it plays: none as fast as possible."""
+        """Wall time between two checks during playback, s; 0 at unlimited speed."""
         return 0.0 if self._speed is None else _SLICE_S
 
     @property
     def _is_busy(self) -> bool:
-        """Whether it has no time to spare for clients."""
+        """Whether playback leaves no time for clients."""
         return not self._paused and (self._is_late or self._speed is None)
 
     @property
     def _idle_s(self) -> float:
-        """Wall time that clients may take now without being charged for it."""
+        """Wall time that clients may use now without a charge, s."""
         if self._paused:
             return math.inf
         return 0.0 if self._is_busy else _SLICE_S
 
     def _serve(self) -> None:
-        """Do what clients have asked for."""
+        """Processes requests of clients."""
         self._inbox.serve(self.graph.deliver, self._idle_s)
 
     def _show_to_newcomers(self) -> None:
-        """Publish to new subscribers what was published last, as soon as the budget has it."""
+        """Publishes the last messages to new subscribers, as soon as the budget allows."""
         self._budget.earn()
         if self._budget.may_spend(_NEWCOMERS):
             before_s = time.thread_time()
@@ -161,7 +160,7 @@ class LogPlayer(PlaybackControl):
             self._budget.spend(_NEWCOMERS, time.thread_time() - before_s)
 
     def _play(self) -> None:
-        """Publish what is due, at most a slice of wall time long."""
+        """Publishes due messages, for a slice of wall time at most."""
         if self._paused:
             return
         begun = time.perf_counter()
@@ -178,7 +177,7 @@ class LogPlayer(PlaybackControl):
                 self.pause()
 
     def _due_ns(self, now: float) -> int:
-        """How far it is to have come by now."""
+        """Returns the time of the log that is due at a wall time."""
         if self._speed is None:
             return self._playback.end_ns
         due_ns = self._base_ns + round((now - self._base_wall) * self._speed * NS_PER_S)
@@ -189,12 +188,12 @@ class LogPlayer(PlaybackControl):
             self._base_ns, self._base_wall = due_ns, now
         return due_ns
 
-    def _tell(self) -> None:
-        """Publish clock and state where their wall time has come."""
+    def _publish_state(self) -> None:
+        """Publishes clock and state when they are due."""
         now = time.perf_counter()
         if now >= self._clock_due and (not self._paused or not self._clock_due):
             self._clock_due = now + _CLOCK_S
             self._clock.publish(Clock(time_from_ns(self._playback.now_ns)))
         if now >= self._state_due:
             self._state_due = now + _STATE_S
-            self._services.tell_state()
+            self._services.publish_state()

@@ -128,7 +128,7 @@ class PlaybackControl:
     def pause(self) -> None:
         """Pauses the playback."""
         self._paused, self._is_late = True, False
-        self._tell_soon()
+        self._publish_soon()
 
     def resume(self) -> None:
         """Continues the playback; at the end, starts over."""
@@ -136,14 +136,14 @@ class PlaybackControl:
             self.seek(self.start_s)
         self._paused = False
         self._rebase()
-        self._tell_soon()
+        self._publish_soon()
 
     def set_speed(self, speed: float | None) -> None:
         """Sets the factor of real time; None: as fast as possible."""
         _check_speed(speed)
         self._speed = speed
         self._rebase()
-        self._tell_soon()
+        self._publish_soon()
 
     def seek(self, time_s: float) -> None:
         """Goes to a time of the log, and publishes the last message before it of each topic."""
@@ -151,7 +151,7 @@ class PlaybackControl:
             raise CommandError(f"a time must be finite, not {time_s}")
         self._playback.seek(ns_from_s(min(max(time_s, self.start_s), self.end_s)))
         self._rebase()
-        self._tell_soon()
+        self._publish_soon()
 
     def single_step(self, steps: int = 1) -> None:
         """Advances by physics steps of the recorded flight. Raises `CommandError` unless paused."""
@@ -164,7 +164,7 @@ class PlaybackControl:
         until_ns = self.time_ns + steps * step_ns
         while not self._playback.advance(until_ns):
             self.graph.deliver()
-        self._tell_soon()
+        self._publish_soon()
 
     def quit(self) -> None:
         """Ends `LogPlayer.run` at its next turn."""
@@ -194,7 +194,7 @@ class PlaybackControl:
         """Counts due times from the current position and wall time."""
         self._base_ns, self._base_wall = self.time_ns, time.perf_counter()
 
-    def _tell_soon(self) -> None:
+    def _publish_soon(self) -> None:
         self._clock_due = self._state_due = 0.0
 
     def _known_origin(self) -> RecordedScenario | None:

@@ -17,7 +17,7 @@ from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
 
-def tell_origin(graph: Graph, scenario: Scenario) -> None:
+def publish_origin(graph: Graph, scenario: Scenario) -> None:
     """Publishes the scenario on `/volery/scenario`, latched: the first message of every log."""
     publisher = graph.advertise(ORIGIN_TOPIC, String, latched=True)
     publisher.publish(String(origin_of_scenario(scenario).to_json()))

@@ -66,7 +66,7 @@ class PlayerServices:
         for name, srvtype, handler in ours:
             offer_command(graph, f"/volery/{name}", srvtype, handler)
 
-    def tell_state(self) -> None:
+    def publish_state(self) -> None:
         """Publishes the playback state."""
         self._state.publish(filled(_STATE, self._present()))
 
@@ -121,7 +121,7 @@ class PlayerServices:
 
     def _set_loop(self, request: Any) -> None:
         self._player.loop = bool(request.data)
-        self.tell_state()
+        self.publish_state()
 
     def _close(self, _request: Any) -> Fields:
         if self._on_close is None:

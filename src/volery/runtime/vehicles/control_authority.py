@@ -43,7 +43,7 @@ class ControlAuthority:
     """Holds the control authority of one simulation; `names` returns its UAVs.
 
     `moved_by` returns the UAVs that a topic, service or action moves, by its absolute name, beside
-    those that the name tells: whoever receives the requests declares them (`graph.moved_uavs`).
+    those that the name contains: the server of the requests declares them (`graph.moved_uavs`).
     Any thread may query it; only the simulation's thread changes it.
     """
 
