@@ -23,7 +23,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from volery.cluster.failure_search import FailureSearch, RandomSampler, Sampler, TpeSampler
 from volery.cluster.loading import LoadedStudy, load_study, parse_study
@@ -43,6 +43,8 @@ from volery_benchmarks import submissions
 from volery_benchmarks.registry import chosen_parts
 
 _LOG = logging.getLogger(__name__)
+_Kinds: TypeAlias = tuple[tuple[str, Mapping[str, Any]], ...]
+"""Kinds of expectations with their keys."""
 _REPETITIONS, _QUICK_REPETITIONS = 1000, 20
 _AVOIDANCE, _QUICK_AVOIDANCE = 1000, 10
 _AVOIDANCE_S = 60.0
@@ -52,7 +54,7 @@ _SEARCHES, _QUICK_SEARCHES = 20, 2
 _MAX_FLIGHTS = 200
 _MAX_RANDOM_FLIGHTS = 1000
 _SUBMISSIONS, _QUICK_SUBMISSIONS = 27, 3
-_HOVER = (
+_HOVER: _Kinds = (
     ("no_contact", {}),
     ("speed", {"at_most_m_s": 1.2}),
     ("inside", {"region_m": (-1.0, -1.0, 1.0, 1.0)}),
@@ -60,7 +62,7 @@ _HOVER = (
     ("topic_rate", {"topic": "imu", "at_least_hz": 150.0}),
 )
 """Some of them fail by little, so that any difference would show."""
-_TEN = (
+_TEN: _Kinds = (
     ("no_contact", {}),
     ("no_crash", {}),
     ("separation", {"at_least_m": 5.0}),
@@ -250,7 +252,7 @@ def _failing(seed: int) -> Scenario:
     return scenario.expecting("speed", at_most_m_s=1.0).expecting("no_contact")
 
 
-def _expecting(scenario: Scenario, kinds: Sequence[tuple[str, Mapping[str, Any]]]) -> Scenario:
+def _expecting(scenario: Scenario, kinds: _Kinds) -> Scenario:
     for kind, keys in kinds:
         scenario = scenario.expecting(kind, **keys)
     return scenario

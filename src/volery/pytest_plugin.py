@@ -42,7 +42,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=Path,
         default=Path("runs/test"),
         metavar="DIR",
-        help="folder for logs and pictures of failed flights",
+        help="folder for logs and maps of failed flights",
     )
 
 
@@ -137,7 +137,7 @@ def flight(request: pytest.FixtureRequest) -> Callable[..., JudgedFlight]:
 
 
 def _check(item: pytest.Item, scenario: Scenario, judged: JudgedFlight) -> None:
-    """Raises `FlightFailedError` for a failed flight, whose log and picture it keeps."""
+    """Raises `FlightFailedError` for a failed flight, whose log and map it keeps."""
     if judged.is_passed:
         return
     lines = [f"{verdict.outcome!s:7} {verdict.describe()}" for verdict in judged.verdicts]
@@ -154,14 +154,14 @@ def _kept(
     from volery.cluster.single_runs import SingleRun
     from volery.runtime.flight_recorder import DEFAULT_RATE_HZ
     from volery.verdicts.judging import Judge
-    from volery.verdicts.pictures import failure_png
+    from volery.verdicts.failure_map import failure_png
 
     folder: Path = item.config.rootpath / item.config.getoption("--volery-out")
     folder.mkdir(parents=True, exist_ok=True)
     name = _UNSAFE.sub("_", item.nodeid).strip("_")[-120:]
-    log, picture = folder / f"{name}.mcap", folder / f"{name}.png"
+    log, image = folder / f"{name}.mcap", folder / f"{name}.png"
     judge = Judge(scenario)
     with SingleRun(scenario, DEFAULT_RATE_HZ, log, judge.needs, judge) as run:
         run.fly()
-    picture.write_bytes(failure_png(judged.flight, judged.verdicts))
-    return (("log", log), ("picture", picture))
+    image.write_bytes(failure_png(judged.flight, judged.verdicts))
+    return (("log", log), ("image", image))

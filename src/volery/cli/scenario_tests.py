@@ -77,7 +77,7 @@ class TestedFlight:
     """Log of a failed flight."""
 
     @property
-    def picture(self) -> Path | None:
+    def image(self) -> Path | None:
         """Map of the paths around the moment of the failure."""
         file = None if self.log is None else self.log.with_suffix(".png")
         return file if file is not None and file.exists() else None

@@ -172,7 +172,7 @@ def _print_failure(path: str, flight: TestedFlight) -> None:
 
 
 def _hints(flight: TestedFlight) -> list[str]:
-    found = {"replay": flight.replay, "log": flight.log, "picture": flight.picture}
+    found = {"replay": flight.replay, "log": flight.log, "image": flight.image}
     return [f"{word:7} {what}" for word, what in found.items() if what]
 
 
@@ -211,7 +211,7 @@ def _plain(flight: TestedFlight) -> dict[str, Any]:
         "wall_s": result.wall_s,
         "replay": flight.replay,
         "log": None if flight.log is None else str(flight.log),
-        "picture": None if flight.picture is None else str(flight.picture),
+        "image": None if flight.image is None else str(flight.image),
     }
 
 

@@ -25,7 +25,7 @@ from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
 from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, digest_of
 from volery.verdicts.judging import Judge
-from volery.verdicts.pictures import failure_png
+from volery.verdicts.failure_map import failure_png
 
 _DISK_FULL = os.strerror(errno.ENOSPC)
 _OF_SENSORS = {"simulation", "estimates", "topics"}
@@ -143,8 +143,8 @@ class RunWorker:
                 flown = flight.fly()
                 result = self._measured(run, flown, kept)
             if keeps_log and judge is not None and not result.is_passed:
-                picture = failure_png(flown.flight, flown.verdicts)
-                (self._job.results / f"{run.id}.png").write_bytes(picture)
+                image = failure_png(flown.flight, flown.verdicts)
+                (self._job.results / f"{run.id}.png").write_bytes(image)
         except Exception as error:
             if _is_disk_full(error):
                 raise DiskFullError(f"{self._job.results}: {_DISK_FULL}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from volery.core.clock import ns_from_s
@@ -44,57 +45,74 @@ class LiveVerdicts:
         self._simulation = simulation
         self._judge = Judge(simulation.scenario)
         self._publisher = simulation.graph.advertise(TOPIC, String)
-        self._begin()
+        self._flight = self._new_flight()
 
     def look(self) -> None:
         """Publishes the verdicts so far to external clients; call it between ticks."""
-        if self._end_s is not None and self._simulation.time_s < self._end_s:
-            self._begin()  # after a reset
-        now_s, publisher = time.perf_counter(), self._publisher
-        watchers, time_s = publisher.num_external_subscriptions, self._simulation.time_s
-        is_fresh = watchers == self._watchers and (now_s < self._due_s or time_s == self._judged_s)
-        if is_fresh or not publisher.has_external_subscribers:
+        now_s, time_s = time.perf_counter(), self._simulation.time_s
+        if self._flight.is_over and time_s < self._flight.judged_s:  # after a reset
+            self._flight = self._new_flight()
+        flight, watchers = self._flight, self._publisher.num_external_subscriptions
+        is_fresh = now_s < flight.due_s or time_s == flight.judged_s
+        if not self._publisher.has_external_subscribers:
             return
-        if self._end_s is None:
-            run = self._recorder.finished(self._wall_s)
-            verdicts = self._judge.verdicts(run, is_over=False)
-            self._last = verdicts_message(verdicts, time_s, is_over=False)
+        if watchers == flight.watchers and (is_fresh or flight.is_over):
+            return
+        if not flight.is_over:
+            verdicts = self._judge.verdicts(flight.recorder.finished(self._wall_s), is_over=False)
+            flight.last = verdicts_message(verdicts, time_s, is_over=False)
+            flight.judged_s = time_s
             took_s = time.perf_counter() - now_s
-            self._due_s = now_s + max(_PERIOD_S, _WALL_PER_JUDGMENT * took_s)
-        self._watchers, self._judged_s = watchers, time_s
-        publisher.publish_external(self._last.message)
+            flight.due_s = now_s + max(_PERIOD_S, _WALL_PER_JUDGMENT * took_s)
+        flight.watchers = watchers
+        self._publisher.publish_external(flight.last.message)
 
     def finish(self, wall_s: float | None = None) -> tuple[Verdict, ...]:
         """Ends the recording, publishes the verdicts and returns them.
 
         wall_s: wall time of the flight, s; None: that since this began, without pauses.
         """
-        self._recorder.stop()
-        run = self._recorder.finished(self._wall_s if wall_s is None else wall_s)
+        flight, time_s = self._flight, self._simulation.time_s
+        flight.recorder.stop()
+        run = flight.recorder.finished(self._wall_s if wall_s is None else wall_s)
         verdicts = self._judge.verdicts(run)
-        self._end_s = self._simulation.time_s
-        self._last = verdicts_message(verdicts, self._end_s, is_over=True)
+        flight.last = verdicts_message(verdicts, time_s, is_over=True)
+        flight.is_over, flight.judged_s = True, time_s
         if self._publisher.has_external_subscribers:
-            self._publisher.publish_external(self._last.message)
+            self._publisher.publish_external(flight.last.message)
         return verdicts
 
     @property
     def last(self) -> Published:
         """The last message, also if no client has received it."""
-        return self._last
+        return self._flight.last
 
-    def _begin(self) -> None:
+    def _new_flight(self) -> _Flight:
         """Records and judges the flight from the present time on."""
-        self._recorder = RunRecorder(self._simulation, self._judge.needs)
-        self._start_s = time.perf_counter() - self._simulation.clock.paused_s
-        self._last = verdicts_message((), self._simulation.time_s, is_over=False)
-        self._end_s: float | None = None
-        """Simulated time at which the flight was over; None: it goes on."""
-        self._watchers = 0
-        """Number of external subscriptions that have received the last message."""
-        self._judged_s = -1.0
-        self._due_s = 0.0
+        return _Flight(
+            RunRecorder(self._simulation, self._judge.needs),
+            time.perf_counter() - self._simulation.clock.paused_s,
+            verdicts_message((), self._simulation.time_s, is_over=False),
+        )
 
     @property
     def _wall_s(self) -> float:
-        return time.perf_counter() - self._start_s - self._simulation.clock.paused_s
+        return time.perf_counter() - self._flight.start_s - self._simulation.clock.paused_s
+
+
+@dataclass
+class _Flight:
+    """A flight from a start or reset on."""
+
+    recorder: RunRecorder
+    start_s: float
+    """Wall time of the start, less the pauses before it."""
+    last: Published
+    """The last message."""
+    is_over: bool = False
+    watchers: int = 0
+    """Number of external subscriptions that have received the last message."""
+    judged_s: float = -1.0
+    """Simulated time of the last message."""
+    due_s: float = 0.0
+    """Wall time of the next judgment."""

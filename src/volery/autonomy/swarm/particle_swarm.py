@@ -195,8 +195,9 @@ def _scatter(
         swarm.cost[k] = math.inf
         counter += 4
     swarm.position[0, 0], swarm.position[0, 1] = size, direction
-    swarm.own[0, 0], swarm.own[0, 1] = size, direction
     swarm.velocity[0, 0] = swarm.velocity[0, 1] = 0.0
+    for k in range(len(swarm.cost)):  # until a position is allowed
+        swarm.own[k, 0], swarm.own[k, 1] = swarm.position[k, 0], swarm.position[k, 1]
     return counter
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
+from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidURI, WebSocketException
@@ -126,7 +127,7 @@ class RosbridgeClient(RemoteClient):
             await asyncio.sleep(pause_s)
 
     async def _connect_once(self) -> None:
-        at = {} if self._socket is None else {"unix": True, "path": self._socket}
+        at: dict[str, Any] = {} if self._socket is None else {"unix": True, "path": self._socket}
         async with connect(
             _LOCAL if at else self.url,
             **at,
