@@ -140,7 +140,7 @@ def print_replay(seed: int) -> None:
 def _avoidance(quick: bool) -> dict[str, float]:
     count = _QUICK_AVOIDANCE if quick else _AVOIDANCE
     scenario = load_scenario("forest_procedural")
-    scenario = scenario.with_({"uavs.0.count": 1, "duration_s": _AVOIDANCE_S})
+    scenario = scenario.with_({"uavs[0].count": 1, "duration_s": _AVOIDANCE_S})
     with _study(scenario.expecting("no_contact"), seeds=count) as (loaded, folder):
         start = time.monotonic()
         plan = fly_runs(loaded, SweepOptions(folder, usable_cores(), reuses_results=False))
@@ -232,16 +232,20 @@ PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
 }
 """Functions of the parts; their argument is `quick`."""
 
-_GUST = ("faults.0.at_s=1:8", "faults.0.velocity_m_s.0=-12:12", "faults.0.velocity_m_s.1=-12:12")
+_GUST = (
+    "faults[0].at_s=1:8",
+    "faults[0].velocity_m_s[0]=-14:14",
+    "faults[0].velocity_m_s[1]=-14:14",
+)
 """When a gust comes, and its velocity."""
 
 
 def _gusty() -> Scenario:
     """Returns a short flight between trees by LIDAR, with a gust."""
     scenario = load_scenario("forest_procedural")
-    gust = {"kind": "gust", "at_s": 1.0, "duration_s": 1.5, "velocity_m_s": [0.0, 0.0, 0.0]}
+    gust = {"kind": "gust", "at_s": 1.0, "hold_s": 2.0, "velocity_m_s": [0.0, 0.0, 0.0]}
     changed = scenario.with_(
-        {"uavs.0.count": 1, "duration_s": 12.0, "seed": 1, "faults": [gust]},
+        {"uavs[0].count": 1, "duration_s": 12.0, "seed": 1, "faults": [gust]},
     )
     return changed.expecting("clearance", at_least_m=0.2).expecting("no_contact")
 

@@ -153,8 +153,8 @@ def _kept(
     """Writes the log of a failed flight, which is flown again for it, and a map of its paths."""
     from volery.cluster.single_runs import SingleRun
     from volery.runtime.flight_recorder import DEFAULT_RATE_HZ
-    from volery.verdicts.judging import Judge
     from volery.verdicts.failure_map import failure_png
+    from volery.verdicts.judging import Judge
 
     folder: Path = item.config.rootpath / item.config.getoption("--volery-out")
     folder.mkdir(parents=True, exist_ok=True)

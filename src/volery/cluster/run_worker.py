@@ -23,9 +23,9 @@ from volery.cluster.single_runs import SingleRun
 from volery.core.errors import VoleryError
 from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
+from volery.verdicts.failure_map import failure_png
 from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, digest_of
 from volery.verdicts.judging import Judge
-from volery.verdicts.failure_map import failure_png
 
 _DISK_FULL = os.strerror(errno.ENOSPC)
 _OF_SENSORS = {"simulation", "estimates", "topics"}
