@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, WithJsonSchema, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from volery.scenario.base import Data, Name, NonNegative, Vector3, warn_of_former_word
+from volery.scenario.base import Data, Name, NonNegative, Vector3
 
 Speed = Annotated[float, Field(gt=0.0, le=100.0)]
 _UAV_NAME = re.compile(r"uav\d+")
@@ -59,22 +59,12 @@ class CircleActor(Data):
 class ExternalActor(Data):
     """Receives its pose from `/actors/NAME/pose` or `/set_entity_state`."""
 
-    kind: Annotated[
-        Literal["external", "outside"],
-        WithJsonSchema({"const": "external", "type": "string"}),
-    ] = "external"
+    kind: Literal["external"] = "external"
     """Motion that an external program sets."""
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
     """Initial position: x, y (on the ground) or x, y, z."""
     yaw_deg: float = 0.0
     """Initial heading, counter-clockwise from x of the map."""
-
-    @field_validator("kind")
-    @classmethod
-    def _rename_former_kind(cls, kind: str) -> str:
-        if kind == "outside":
-            warn_of_former_word("motion 'outside'", "external")
-        return "external"
 
 
 class AttachedActor(Data):

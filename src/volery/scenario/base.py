@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
@@ -108,10 +107,6 @@ class Data(Bounded):
 
     model_config = ConfigDict(str_strip_whitespace=True)
 
-    former_keys: ClassVar[Mapping[str, str]] = {}
-    """Former keys, which recorded logs contain, with present names; each raises a
-    DeprecationWarning."""
-
     if not TYPE_CHECKING:  # type checkers read the parameters from the fields
 
         def __init__(self, /, **data: Any) -> None:
@@ -137,11 +132,10 @@ class Data(Bounded):
 
     @model_validator(mode="before")
     @classmethod
-    def _rename_former_keys(cls, data: Any) -> Any:
+    def _take_arrays(cls, data: Any) -> Any:
         if not isinstance(data, Mapping):
             return data
-        lists = {key: _without_arrays(value) for key, value in data.items()}
-        return renamed(lists, cls.former_keys, "key")
+        return {key: _without_arrays(value) for key, value in data.items()}
 
 
 def _without_arrays(value: Any, depth: int = 8) -> Any:
@@ -151,25 +145,6 @@ def _without_arrays(value: Any, depth: int = 8) -> Any:
     if depth and isinstance(value, Mapping):
         return {key: _without_arrays(item, depth - 1) for key, item in value.items()}
     return value.tolist() if hasattr(value, "tolist") else value
-
-
-def renamed(data: Mapping[str, Any], former: Mapping[str, str], what: str) -> dict[str, Any]:
-    """Returns `data` with present names for former ones, and warns of each.
-
-    Raises `ValueError` if the data contain both.
-    """
-    for old, new in former.items():
-        if old not in data:
-            continue
-        warn_of_former_word(f"{what} '{old}'", new)
-        if new in data:
-            raise ValueError(f"{what}s '{old}' and '{new}' are the same; use only '{new}'")
-    return {former.get(key, key): value for key, value in data.items()}
-
-
-def warn_of_former_word(what: str, new: str) -> None:
-    """Warns that a scenario uses a renamed word."""
-    warnings.warn(f"{what} of scenarios is named '{new}' now", DeprecationWarning, stacklevel=2)
 
 
 class SensorData(Data):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -28,11 +27,6 @@ class Streets(Data):
     """Fraction of the tree positions that have a tree."""
     tree_species: str = "broadleaf"
     """Species of the street trees."""
-
-    former_keys: ClassVar[Mapping[str, str]] = {
-        "widest_m": "max_width_m",
-        "tree_share": "tree_fraction",
-    }
 
 
 class City(Data):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -16,7 +16,7 @@ from volery.core.errors import ScenarioError, reason_of
 from volery.core.plurals import counted
 from volery.core.whole_files import write_whole
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.base import Data, Name, renamed
+from volery.scenario.base import Data, Name
 from volery.scenario.expectations import Expectation
 from volery.scenario.faults import Fault
 from volery.scenario.file_names import moved
@@ -110,8 +110,6 @@ class Scenario(Data):
     message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
-    former_keys: ClassVar[Mapping[str, str]] = {"messages": "message_packages"}
-
     _access: ScenarioAccess = PrivateAttr(default_factory=ScenarioAccess)
 
     @model_validator(mode="after")
@@ -160,11 +158,8 @@ class Scenario(Data):
         `ScenarioError`, naming key and allowed values, for invalid values.
         """
         where = self.name
-        try:
-            named = renamed({**(changes or {}), **keys}, self.former_keys, "key")
-        except ValueError as error:
-            raise ScenarioError(f"{where}: {error}") from None
-        short, long = split_changes(named, type(self).model_fields, where)
+        given = {**(changes or {}), **keys}
+        short, long = split_changes(given, type(self).model_fields, where)
         changed = validated(with_keys(self.data(), long, where), Scenario, where)
         if short:
             data = with_short_forms(changed.data(), short, where)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -113,11 +112,6 @@ class EstimateSensor(SensorData):
     """Whether the UAV's controllers use the estimate; false: ground truth."""
     external_odometry: ExternalOdometrySource | None = None
     """Odometry of a node that aids the estimator; None: there is none."""
-
-    former_keys: ClassVar[Mapping[str, str]] = {
-        "flies": "used_for_control",
-        "pose": "external_odometry",
-    }
 
 
 class GroundTruthSensor(SensorData):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from volery.scenario.base import Data, Vector2, renamed
-from volery.scenario.former_parameters import former_parameters
+from volery.scenario.base import Data, Vector2
 from volery.scenario.node_names import NODE_PATTERN, name_of_class
 from volery.scenario.sensors import Sensor
 
@@ -64,14 +63,6 @@ class NodeEntry(Data):
     @classmethod
     def _name_the_class(cls, node: Any) -> Any:
         return name_of_class(node) if isinstance(node, type) else node
-
-    @field_validator("parameters")
-    @classmethod
-    def _rename_former_parameters(
-        cls, parameters: dict[str, Any], info: ValidationInfo
-    ) -> dict[str, Any]:
-        node = info.data.get("node", "")
-        return renamed(parameters, former_parameters(node), f"{node}: parameter")
 
 
 class RotorWear(Data):

@@ -74,7 +74,6 @@ class InventoryForest(Data):
     fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     """Fraction of the trees, at random; a smaller fraction is a subset of a larger one."""
 
-    former_keys: ClassVar[Mapping[str, str]] = {"share": "fraction"}
     quantities: ClassVar[Mapping[str, Quantity]] = {"position_m": PROJECTED}
 
     @model_validator(mode="after")
@@ -105,8 +104,6 @@ class ProceduralForest(Data):
 
 class World(Data):
     """Ground, trees, buildings, actors, air."""
-
-    former_keys: ClassVar[Mapping[str, str]] = {"things": "actors"}
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     """Seed of the world alone; None: the scenario's seed is used."""

@@ -46,23 +46,6 @@ def test_wrong_changes_are_refused_with_the_key(changes, message):
         load_scenario("hover").with_(**changes)
 
 
-def test_former_keys_are_accepted_with_a_warning_and_not_offered():
-    hover = load_scenario("hover")
-    with pytest.warns(DeprecationWarning, match="'messages' .* 'message_packages' now"):
-        assert hover.with_(messages=["px4_msgs"]).message_packages == ("px4_msgs",)
-    with pytest.raises(ScenarioError) as caught:
-        hover.with_(massages=[])
-    assert "'messages'" not in str(caught.value)
-    assert "messages," not in str(caught.value)
-    both = {"messages": [], "message_packages": []}
-    message = r"^hover: .*'messages' and 'message_packages' are the same"
-    with (
-        pytest.warns(DeprecationWarning, match="'messages'"),
-        pytest.raises(ScenarioError, match=message),
-    ):
-        hover.with_(both)
-
-
 # ---------------------------------------------------------------------------------- paths of keys
 
 

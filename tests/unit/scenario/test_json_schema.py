@@ -12,7 +12,6 @@ from volery.core.errors import ScenarioError
 from volery.scenario import list_scenarios, load_scenario, parse_scenario
 from volery.scenario.json_schema import models, scenario_schema, schema_text, write_schema
 from volery.scenario.library import path_of
-from volery.scenario.schema import Scenario
 from volery.scenario.toml_writer import SCHEMA_DIRECTIVE, SCHEMA_FILE
 
 
@@ -110,12 +109,6 @@ def test_references_lead_somewhere(schema):
 def test_values_that_toml_lacks_do_not_occur(schema):
     assert not [node for node in nodes_of(schema) if None in node.values()]
     assert {"type": "null"} not in list(nodes_of(schema))
-
-
-def test_former_words_are_not_offered(schema):
-    assert "messages" in Scenario.former_keys
-    assert "messages" not in schema["properties"]
-    assert schema["$defs"]["ExternalActor"]["properties"]["kind"]["const"] == "external"
 
 
 # ----------------------------------------------------------------------------------- volery schema

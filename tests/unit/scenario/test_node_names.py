@@ -2,7 +2,6 @@
 
 import inspect
 import pkgutil
-import warnings
 from importlib import import_module
 
 import pytest
@@ -13,7 +12,6 @@ from volery.runtime.build.node_loading import find_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import parse_scenario
 from volery.scenario.node_names import (
-    _FORMER_PATHS,
     is_same_node,
     node_module,
     node_path,
@@ -55,16 +53,6 @@ def test_every_node_that_ships_has_a_name():
     leaves = [kind for kind in found if not any(kind in other.__mro__[1:] for other in found)]
     paths = {f"{kind.__module__}:{kind.__name__}" for kind in leaves}
     assert paths == {path for path in registered_nodes().values() if path.startswith("volery.")}
-
-
-@pytest.mark.parametrize("former", sorted(_FORMER_PATHS))
-def test_paths_of_recorded_logs_are_read(former):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        path = node_path(former)
-    assert bool(caught) == (path != former)
-    assert path == node_path(_FORMER_PATHS[former])
-    assert path in registered_nodes().values()
 
 
 @pytest.mark.parametrize("bad", ["", "a b", ":Class", "module:", "../evil:Node", "-x"])
