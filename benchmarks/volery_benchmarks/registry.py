@@ -261,7 +261,7 @@ BENCHES: dict[str, Bench] = {
             "node in its own process, or both in lock step",
             {
                 f"{way}_one_way_ms": Bound(10.0, at_most=True)
-                for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")
+                for way in ("lock_step", "rosbridge", "ros1")
             },
         ),
         Bench(

@@ -23,7 +23,6 @@ from volery.autonomy.search.calls import JOIN
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros1.environment import rospy_is_installed
-from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
 from volery.graph.nodes.node import Context
@@ -44,10 +43,7 @@ def measure() -> Measured:
     """Returns medians and 95th percentiles, ms; `lock_step`: one process, in wall time."""
     figures = _lock_step_figures()
     failures: dict[str, str] = {}
-    for name, bridge in (
-        ("rosbridge", RosbridgeServer(port=0)),
-        ("ros_tcp", RosTcpEndpoint(port=0)),
-    ):
+    for name, bridge in (("rosbridge", RosbridgeServer(port=0)),):
         with flying() as bridges:
             bridges.open(bridge)
             figures.update(call_figures(name, exchange(name, bridge.port)))

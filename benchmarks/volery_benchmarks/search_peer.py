@@ -111,10 +111,6 @@ def _open_link(via: str, port: int, name: str) -> GraphConnection:
         from volery.bridges.rosbridge.client import RosbridgeClient
 
         return RosbridgeClient(f"ws://127.0.0.1:{port}", name=name)
-    if via == "ros_tcp":
-        from volery.bridges.ros_tcp.client import RosTcpClient
-
-        return RosTcpClient(port=port, name=name)
     from volery.bridges.ros1.client import Ros1Client
 
     return Ros1Client(node_name=f"bench_{name}")

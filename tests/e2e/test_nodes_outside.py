@@ -12,8 +12,6 @@ from volery import Simulation
 from volery.autonomy.avoidance.gap_following import GapFollowing
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.nodes.host import NodeHost
-from volery.bridges.ros_tcp.client import RosTcpClient
-from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import GraphError
@@ -96,17 +94,6 @@ def over_rosbridge(simulation):
         yield lambda: RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="gap_following")
 
 
-def over_ros_tcp(generation):
-    @contextmanager
-    def way(simulation):
-        endpoint = RosTcpEndpoint(port=0, generation=generation)
-        with BridgeHost(simulation.gateway) as bridges:
-            bridges.open(endpoint)
-            yield lambda: RosTcpClient(port=endpoint.port, name="gap_following")
-
-    return way
-
-
 def fly_outside(way):
     with Simulation(scenario(with_node=False)) as simulation, way(simulation) as open_link:
         commands = listen(simulation)
@@ -142,8 +129,6 @@ def fly_outside(way):
 WAYS = {
     "in memory": in_memory,
     "rosbridge": over_rosbridge,
-    "ROS-TCP, ROS 1": over_ros_tcp("ros1"),
-    "ROS-TCP, ROS 2": over_ros_tcp("ros2"),
 }
 
 

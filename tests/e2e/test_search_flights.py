@@ -13,7 +13,6 @@ from ros1_bench import missing_of_ros1, shared_master
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros1.bridge import Ros1Bridge
-from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.engine.events import EventKind
 
@@ -149,12 +148,6 @@ def open_rosbridge(bridges):
     return f"rosbridge://127.0.0.1:{bridge.port}"
 
 
-def open_ros_tcp(bridges):
-    bridge = RosTcpEndpoint(port=0)
-    bridges.open(bridge)
-    return f"ros-tcp://127.0.0.1:{bridge.port}"
-
-
 def open_ros1(bridges):
     if missing_of_ros1():
         pytest.skip(f"no {', '.join(missing_of_ros1())}: see .ci/install_ros1")
@@ -167,7 +160,7 @@ def open_ros1(bridges):
 # rospy uses what is deprecated and forgets to close sockets
 @pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("open_bridge", [open_rosbridge, open_ros_tcp, open_ros1])
+@pytest.mark.parametrize("open_bridge", [open_rosbridge, open_ros1])
 def test_each_node_in_a_process_of_its_own(open_bridge, tmp_path, simulate):
     simulation = simulate(meadow(tmp_path, 2, with_nodes=False))
     watch = Watch(simulation)

@@ -205,7 +205,7 @@ def test_the_real_simulation_ends_by_sigterm(tmp_path):
     assert summarize(log).problem == ""
 
 
-NOWHERE = "ros-tcp://127.0.0.1:9"
+NOWHERE = "rosbridge://127.0.0.1:9"
 
 
 # ------------------------------------------------------------------------------------------ locks

@@ -17,11 +17,8 @@ if TYPE_CHECKING:
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-WAYS = (
-    "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh, rclpy or mavlink://ADDRESS"
-)
+WAYS = "rosbridge://HOST:PORT, ros1, ros2, ros2-zenoh, rclpy or mavlink://ADDRESS"
 ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
-_ROS_TCP_PORT = 10000
 TIMEOUT_S = 30.0
 """Wall time for which a node in its own process waits for its graph; a world may take long to
 build."""
@@ -36,13 +33,6 @@ def open_link(via: str, name: str) -> GraphConnection:
 
         url = via if scheme != "rosbridge" else f"ws://{rest}"
         return RosbridgeClient(url, name=name)
-    if scheme in ("ros-tcp", "ros-tcp-2"):
-        from volery.bridges.ros_tcp.client import RosTcpClient
-
-        host, port = _address(via, _ROS_TCP_PORT)
-        return RosTcpClient(
-            host, port, name=name, generation="ros2" if scheme == "ros-tcp-2" else "ros1"
-        )
     if scheme == "ros1":
         from volery.bridges.ros1.client import Ros1Client
 
@@ -132,18 +122,6 @@ def _ros2_terms(via: str) -> Ros2Environment:
     if zenoh:
         return Ros2Environment("zenoh", domain_id, router=parts.netloc)
     return Ros2Environment("rclpy" if kind == "rclpy" else "dds", domain_id, interfaces)
-
-
-def _address(via: str, port: int) -> tuple[str, int]:
-    """Returns host and port of a graph's address. Raises `BridgeError` if `via` is invalid."""
-    try:
-        parts = urlsplit(via)
-        host, given = parts.hostname, parts.port
-    except ValueError:
-        raise _no_way(via) from None
-    if host is None or given == 0 or parts.path.strip("/"):
-        raise _no_way(via)
-    return host, given or port
 
 
 def _no_way(via: str) -> BridgeError:

@@ -62,9 +62,7 @@ def run_node(options: NodeOptions) -> None:
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
     if options.lock_step_s is not None and via.partition("://")[0] in ROS2_WAYS:
-        raise BridgeError(
-            "--lock-step: ROS 2 keeps no order between topics; use rosbridge or ros-tcp"
-        )
+        raise BridgeError("--lock-step: ROS 2 keeps no order between topics; use rosbridge")
     if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
     folder = options.profile.parent if options.profile else None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.core.errors import BridgeError, UnreachableError
 
@@ -21,13 +20,6 @@ def test_rosbridge() -> None:
 
 
 def test_why_nobody_answers_is_told_in_words() -> None:
-    for client, url in ((RosbridgeClient, "ws://127.0.0.1:1"), (RosTcpClient, "127.0.0.1")):
-        more = {"port": 1} if client is RosTcpClient else {}
-        with pytest.raises(UnreachableError) as told:
-            client(url, connect_timeout_s=1.0, **more)
-        assert str(told.value).endswith("127.0.0.1:1: Connection refused")
-
-
-def test_ros_tcp() -> None:
-    with pytest.raises(BridgeError, match="no ROS-TCP server"):
-        RosTcpClient("a..b", connect_timeout_s=0.5)
+    with pytest.raises(UnreachableError) as caught:
+        RosbridgeClient("ws://127.0.0.1:1", connect_timeout_s=1.0)
+    assert str(caught.value).endswith("127.0.0.1:1: Connection refused")

@@ -13,28 +13,37 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import threading
 import time
-from typing import Any
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Any, TypeVar
 
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidURI, WebSocketException
 from websockets.uri import parse_uri
 
 from volery.bridges.loop_waker import wake_of
-from volery.bridges.remote_client import RemoteClient
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
-from volery.core.errors import BridgeError, reason_of
-from volery.graph.session import SessionInfo
+from volery.core.errors import BridgeError, GraphError, UnreachableError, reason_of
+from volery.graph.qos import DEFAULT_DEPTH
+from volery.graph.service_reply import ServiceReply
+from volery.graph.session import Handler, SessionInfo
+from volery.graph.subscription_queue import SubscriptionQueue, Wake
+
+T = TypeVar("T")
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 5.0
 _KEEPALIVE_S = 20.0
+_ANSWER_TIMEOUT_S = 5.0
 _UNIX, _LOCAL = "unix://", "ws://localhost/"
 
 
-class RosbridgeClient(RemoteClient):
+class RosbridgeClient:
     """Connects one program to a remote graph. Any thread may call the methods.
 
     Parameters
@@ -57,9 +66,6 @@ class RosbridgeClient(RemoteClient):
 
     """
 
-    _PROTOCOL = "rosbridge"
-    _SERVER = "server"
-
     def __init__(
         self,
         url: str,
@@ -77,13 +83,47 @@ class RosbridgeClient(RemoteClient):
             parse_uri(_LOCAL if self._socket else url)
         except (InvalidURI, ValueError):
             raise _no_address(url) from None
-        super().__init__(name, url)
-        self.url = url
+        self.name, self.url = name, url
+        self._why = "no answer"
+        """Why there is no connection."""
+        self._loop = asyncio.new_event_loop()
+        self._connected = threading.Event()
+        self._connections = 0
+        self._closed = False
         self._most_bytes = max_message_bytes
         self._wanted = asyncio.Event()
         self._state = ClientState(token, wake_of(self._loop, self._wanted.set), generation)
-        self._topics = self._services = self._state
         self._start(connect_timeout_s)
+
+    def _start(self, connect_timeout_s: float) -> None:
+        """Starts to connect. Raises `BridgeError` if no server answers in time; 0: do not wait."""
+        self._main = self._loop.create_task(self._keep_connected())
+        name = f"{self.name}-rosbridge"
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+        if connect_timeout_s:
+            try:
+                self.wait_until_connected(connect_timeout_s)
+            except BaseException:  # also after Ctrl-C, or its thread runs into the end of Python
+                self.close()
+                raise
+
+    # --------------------------------------------------------------------------------- connection
+
+    @property
+    def connected(self) -> bool:
+        """Whether the server is connected."""
+        return self._connected.is_set()
+
+    @property
+    def connections(self) -> int:
+        """Number of connections so far."""
+        return self._connections
+
+    def wait_until_connected(self, timeout_s: float) -> None:
+        """Waits for the server. Raises `BridgeError` if it does not answer in time."""
+        if not self._connected.wait(timeout_s):
+            raise UnreachableError(f"no rosbridge server at {self.url}: {self._why}")
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -100,16 +140,133 @@ class RosbridgeClient(RemoteClient):
         """Current state of the client."""
         return self._state.info(self.name)
 
+    # ------------------------------------------------------------------------------------ topics
+
+    def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
+        """Advertises `topic`. Raises `GraphError` for a wrong type."""
+        self._check_open()
+        self._state.advertise(topic, msgtype, latched)
+
+    def unadvertise(self, topic: str) -> None:
+        """Ends the publication of `topic`. Raises `GraphError` if there was none."""
+        self._state.unadvertise(topic, self.name)
+
+    def published_type(self, topic: str) -> str | None:
+        """Returns the advertised type of `topic`; None if it is not advertised."""
+        return self._state.published_type(topic)
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message of the announced type.
+
+        Without a connection it is dropped; of what the network is too slow for, the oldest.
+        """
+        self._check_open()
+        self._state.publish(topic, message, self.name)
+
+    def subscribe(
+        self,
+        topic: str,
+        msgtype: str | None = None,
+        *,
+        depth: int = DEFAULT_DEPTH,
+        reliable: bool = False,
+        wake: Wake,
+    ) -> SubscriptionQueue:
+        """Subscribes like `GraphConnection.subscribe`.
+
+        Without a type the client asks the server for it.
+        """
+        self._check_open()
+        if msgtype is None:
+            msgtype = self._type_of(topic)
+            if not msgtype:
+                raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
+        return self._state.subscribe(topic, msgtype, depth, reliable, wake)
+
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
+        """Ends a subscription; queued messages remain available."""
+        self._state.unsubscribe(queue)
+
     def _type_of(self, topic: str) -> str:
         return self._ask(
             lambda found: self._state.ask_rosapi("topic_type", {"topic": topic}, found),
             f"rosapi at {self.url} does not answer",
         )
 
+    def _ask(self, ask: Callable[[Future[T]], object], silence: str) -> T:
+        """Sends a request with `ask` and waits for the answer.
+
+        Raises `GraphError` with the text `silence` if no answer arrives, and also in the client's
+        own thread, which would wait for itself.
+        """
+        if threading.current_thread() is self._thread:
+            raise GraphError("give a type: the client's own thread cannot wait for the server")
+        found: Future[T] = Future()
+        ask(found)
+        try:
+            return found.result(_ANSWER_TIMEOUT_S)
+        except FutureTimeoutError:
+            raise GraphError(silence) from None
+
+    # ---------------------------------------------------------------------------------- services
+
+    def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
+        """Calls a service; `reply` receives the response or a `GraphError` in the client's thread.
+
+        Calls that are open when the connection breaks fail.
+        """
+        self._check_open()
+        self._state.call(service, request, reply)
+
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Creates a service; `handler(request, reply)` is called in the client's thread."""
+        self._check_open()
+        self._state.create_service(service, srvtype, handler)
+
+    def destroy_service(self, service: str) -> None:
+        """Destroys a service. Raises `GraphError` if it does not exist."""
+        self._state.destroy_service(service, self.name)
+
+    # --------------------------------------------------------------------------------------- end
+
+    def close(self) -> None:
+        """Disconnects; further calls do nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self._loop.call_soon_threadsafe(self._leave)
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise GraphError(f"{self.name} is closed")
+
     # ------------------------------------------------------------------------------- its thread
 
-    def _drop(self, why: str) -> None:
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._main)
+        except asyncio.CancelledError:
+            pass
+        finally:
+            self._lose(f"{self.name} is closed")
+            self._loop.close()
+
+    def _joined(self) -> None:
+        """Marks the client as connected, after the server has received all requests."""
+        self._connections += 1
+        self._connected.set()
+
+    def _lose(self, why: str) -> None:
+        """Marks the client as disconnected."""
+        self._connected.clear()
         self._state.lose(why)
+
+    def _leave(self) -> None:
+        """Ends `_keep_connected`, after `close`."""
+        self._main.cancel()
 
     async def _keep_connected(self) -> None:
         pause_s = _FIRST_PAUSE_S

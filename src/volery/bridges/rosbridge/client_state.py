@@ -14,8 +14,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
-from volery.bridges.remote_topics import RemoteTopics, Subscription
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
+from volery.bridges.rosbridge.client_topics import RemoteTopics, Subscription
 from volery.bridges.rosbridge.fragments import Assembly
 from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.wire import (

@@ -1,4 +1,4 @@
-"""What the clients of ROS-TCP and of rosbridge have in common."""
+"""A client of rosbridge: its thread, its queues, its end."""
 
 import queue
 import threading
@@ -7,8 +7,6 @@ import pytest
 from ros_tcp_client import Loop, until
 
 from volery.bridges.bridge_host import BridgeHost
-from volery.bridges.ros_tcp.client import RosTcpClient
-from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import GraphError
@@ -20,21 +18,6 @@ TRIGGER = "std_srvs/srv/Trigger"
 Request = message_type(f"{TRIGGER}_Request")
 PATIENT = {"connect_timeout_s": 60.0}
 """With a busy machine."""
-WAYS = {
-    "ros-tcp": (
-        RosTcpEndpoint,
-        lambda port, **options: RosTcpClient(port=port, **PATIENT, **options),
-    ),
-    "rosbridge": (
-        RosbridgeServer,
-        lambda port, **options: RosbridgeClient(f"ws://127.0.0.1:{port}", **PATIENT, **options),
-    ),
-}
-
-
-@pytest.fixture(params=WAYS)
-def way(request):
-    return request.param
 
 
 @pytest.fixture
@@ -46,11 +29,10 @@ def loop():
 
 
 @pytest.fixture
-def client(loop, way):
-    serve, join = WAYS[way]
-    server = serve(port=0)
+def client(loop):
+    server = RosbridgeServer(port=0)
     loop.bridges.open(server)
-    client = join(server.port, name="planner")
+    client = RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="planner", **PATIENT)
     yield client
     client.close()
 
@@ -59,8 +41,8 @@ def topics(loop):
     return {t.name: t for t in loop.graph.topics()}
 
 
-def test_its_thread_bears_its_name_and_ends_with_it(client, way):
-    name = f"planner-{way}"
+def test_its_thread_bears_its_name_and_ends_with_it(client):
+    name = "planner-rosbridge"
     assert name in [thread.name for thread in threading.enumerate()]
     assert (client.connected, client.connections) == (True, 1)
     client.close()
@@ -84,7 +66,7 @@ def test_its_own_thread_cannot_wait_for_an_answer(loop, client):
     assert "give a type: the client's own thread cannot wait" in said.get(timeout=60.0)
 
 
-def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client, way):
+def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client):
     left = threading.Event()
 
     def wake():
@@ -95,7 +77,7 @@ def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client, 
     until(lambda: "/out" in topics(loop))
     loop.publish(loop.graph.advertise("/out", STRING), String("go"))
     assert left.wait(60.0)
-    until(lambda: f"planner-{way}" not in [thread.name for thread in threading.enumerate()])
+    until(lambda: "planner-rosbridge" not in [thread.name for thread in threading.enumerate()])
     with pytest.raises(GraphError, match="planner is closed"):
         client.advertise("/in", STRING)
 
@@ -131,7 +113,7 @@ def test_ctrl_c_while_it_connects_leaves_no_thread(monkeypatch):
     def interrupted(_client, _timeout_s):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(RosTcpClient, "wait_until_connected", interrupted)
+    monkeypatch.setattr(RosbridgeClient, "wait_until_connected", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        RosTcpClient("127.0.0.1", 9, name="stopped early")
+        RosbridgeClient("ws://127.0.0.1:9", name="stopped early")
     assert not [t for t in threading.enumerate() if t.name.startswith("stopped early")]
