@@ -266,3 +266,42 @@ def test_a_first_scenario_that_is_wrong_ends_the_command(tmp_path):
         )
         assert ran.returncode == 2
         assert why in ran.stderr
+
+
+def test_a_log_is_served_with_the_verdicts_of_its_flight(tmp_path):
+    scenario = tmp_path / "own.toml"
+    expectation = '[[expect]]\nkind = "speed"\nat_most_m_s = 0.01\n'
+    scenario.write_text(OWN.format(name="own", height=5.0) + expectation, encoding="utf-8")
+    log = tmp_path / "own.mcap"
+    subprocess.run(
+        [*VOLERY, "run", str(scenario), "--record", str(log)], check=True, capture_output=True
+    )
+    server = Server("serve", log, "--port", 0)
+    try:
+        server.wait_for(state="flying", scenario="own")
+        with Ros(server) as ros:
+            message = ros.first("/volery/verdicts", "std_msgs/String")
+            assert ros.first("/volery/player/state", "volery_interfaces/PlayerState")["end"] > 0.3
+        found = json.loads(message["data"])
+        assert (found["over"], [each["name"] for each in found["verdicts"]]) == (
+            True,
+            ["speed <= 0.01 m/s"],
+        )
+    finally:
+        server.end(signal.SIGKILL)
+
+
+def test_a_log_that_is_none_is_an_error(tmp_path):
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"no log")
+    for path, reason in ((broken, "broken.mcap"), (tmp_path / "nowhere.mcap", "nowhere.mcap")):
+        done = subprocess.run(
+            [*VOLERY, "serve", str(path), "--port", "0"],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=600.0,
+        )
+        assert done.returncode == 2
+        assert "error: " in done.stderr
+        assert reason in done.stderr

@@ -163,7 +163,7 @@ def serve(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            help="Scenario name (volery list) or TOML file; default: hover for an hour."
+            help="Scenario name (volery list), TOML file, or log; default: hover for an hour."
         ),
     ] = None,
     port: Annotated[

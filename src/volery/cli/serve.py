@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 _THREADS = 2
+_LOG_SUFFIXES = (".mcap", ".bag", ".db3")
 _GLANCE_S = 0.02
 """Wall seconds between looks at clients of a paused world, and at Ctrl-C without a world."""
 _FAREWELL_S = 0.1
@@ -46,7 +47,7 @@ class ServeOptions:
     """Holds the command line's options."""
 
     first: RunOptions
-    """First scenario, and the options of all runs."""
+    """First scenario or log, and the options of all runs."""
     page: PageSettings
 
 
@@ -57,33 +58,37 @@ class _StoppedError(Exception):
 def serve(options: ServeOptions) -> None:
     """Serves until Ctrl-C, or until a client quits the simulator.
 
-    Raises `VoleryError` if the first scenario cannot be built or the server cannot listen.
+    Raises `VoleryError` if the first scenario cannot be built, the first log cannot be opened, or
+    the server cannot listen.
     """
     from volery.scenario.catalog import ScenarioCatalog
 
     check_bridges(options.first)
     for gap in token_gaps(options.first):
         warn(gap)
-    first = _first_scenario(with_trust(options.first))
+    log = _log_of(options.first.scenario)
+    first = None if log is not None else _first_scenario(with_trust(options.first))
     shelf = ScenarioCatalog(options.page.uploads, options.page.recordings, given=first)
     return_large_blocks()
     with Interrupts() as interrupts, serving(options.page, shelf) as page:
-        host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
+        host = _Host(options, page, interrupts, _Wish(log or first, options.first.speed, shelf))
         while host.goes_on:
             host.go_on()
     echo_line("the server has stopped", err=True)
 
 
 class _Wish:
-    """Holds what runs next: the first scenario, then what clients request."""
+    """Holds what runs next: the first scenario or log, then what clients request."""
 
-    def __init__(self, scenario: Scenario, speed: float | None, shelf: ScenarioCatalog) -> None:
+    def __init__(
+        self, first: Scenario | Path | None, speed: float | None, shelf: ScenarioCatalog
+    ) -> None:
         self.shelf = shelf
         """Scenarios that may run."""
         self.speed = speed
         """Initial real-time factor; None: as fast as possible."""
         self.asked = True
-        self._wanted: Scenario | Path | None = scenario
+        self._wanted = first
         self.quit: Callable[[], None] = _nothing
 
     def ask(self, request: WorldRequest | LogRequest | None) -> None:
@@ -246,6 +251,13 @@ class _Host:
                 idle.wait(_GLANCE_S)
             idle.wait(_FAREWELL_S)
         self._quits = idle.quitting
+
+
+def _log_of(name: str) -> Path | None:
+    """Returns the path of a log; None for the name or file of a scenario."""
+    path = Path(name)
+    is_log = path.suffix.lower() in _LOG_SUFFIXES or path.is_dir()
+    return path if is_log else None
 
 
 def _first_scenario(options: RunOptions) -> Scenario:

@@ -76,10 +76,6 @@ class RunPlan:
             count += 1
         return count
 
-    def put_back(self, runs: Sequence[RunSpec]) -> None:
-        """Makes taken runs missing again; they come next."""
-        self._missing.extendleft(reversed(runs))
-
     def add(self, run: RunSpec, result: RunResult) -> None:
         """Adds a result; a stop rule may want further runs of the point."""
         is_new = run.id not in self.results
