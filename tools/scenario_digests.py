@@ -24,7 +24,7 @@ from typing import TypedDict
 
 from volery import Simulation, load_scenario
 from volery.graph.messages import Published
-from volery.runtime.monitoring.output_sink import NOT_OF_THE_WORLD
+from volery.runtime.output_sink import NOT_OF_THE_WORLD
 from volery.scenario import library
 
 DEFAULT_SECONDS = 8.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from volery import load_scenario
 from volery.core import rotations
-from volery.runtime.build.fleet import add_bodies, place
-from volery.runtime.build.worlds import build_city, build_forest, build_terrain
+from volery.runtime.construction.fleet import add_bodies, place
+from volery.runtime.construction.worlds import build_city, build_forest, build_terrain
 from volery.sensors.cameras.camera import take
 from volery.sensors.cameras.light import make_light
 from volery.sensors.cameras.model import CameraModel

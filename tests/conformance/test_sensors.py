@@ -12,7 +12,7 @@ import pytest
 
 from volery.core.clock import Schedule
 from volery.graph.typestore import typestore
-from volery.runtime.build.sensor_suites import RESULT_OF, noise_key
+from volery.runtime.construction.sensor_suites import RESULT_OF, noise_key
 from volery.sensors import model as sensor_models
 
 NS = 1_000_000_000

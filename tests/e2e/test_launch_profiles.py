@@ -19,7 +19,7 @@ from volery.bridges.nodes.profile import Profile, load_profile
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.cli.launch import start_profile
-from volery.runtime.build.node_loading import start_node
+from volery.runtime.construction.node_loading import start_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry

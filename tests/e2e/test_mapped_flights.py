@@ -9,7 +9,7 @@ from volery.autonomy.mapping.octomap_stream import decode_binary
 from volery.autonomy.planning.exploration_node import POLYGON
 from volery.engine.events import EventKind
 from volery.graph.messages import header, message_type
-from volery.runtime.build.worlds import build_forest, build_terrain
+from volery.runtime.construction.worlds import build_forest, build_terrain
 from volery.scenario.load import parse_scenario
 
 MOUNTS = {"level_mount": [0.0, 0.0, 0.18], "nodding_mount": [0.1, 0.0, -0.08]}

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib import image
 
 from volery.core import rotations
-from volery.runtime.build.worlds import (
+from volery.runtime.construction.worlds import (
     build_city,
     build_forest,
     build_scene,

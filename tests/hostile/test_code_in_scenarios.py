@@ -23,7 +23,7 @@ from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
-from volery.runtime.build.node_loading import find_node, is_local
+from volery.runtime.construction.node_loading import find_node, is_local
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.access import ScenarioAccess

@@ -16,7 +16,7 @@ from volery.bridges.logs.recorded_flight import RecordedScenario, read_flight
 from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
-from volery.runtime.build.worlds import geometry_of
+from volery.runtime.construction.worlds import geometry_of
 from volery.runtime.replay.log_player import LogPlayer
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.scenario.access import SHIPPED_DATA, ScenarioAccess

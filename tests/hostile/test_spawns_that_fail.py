@@ -18,7 +18,7 @@ from volery.publishing.camera_publishing import CameraPublisher
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.publishing.lidar_publishing import LidarPublisher
 from volery.runtime import snapshot_manager
-from volery.runtime.build import assembly
+from volery.runtime.construction import assembly
 from volery.runtime.snapshot_manager import SnapshotManager
 from volery.runtime.vehicles import manager
 from volery.runtime.vehicles.external_odometry import ExternalOdometry

@@ -5,7 +5,7 @@ import pytest
 from page_browsing import keep_picture
 from scene_reading import eye, wait_for_frames, wait_for_picture, wait_until
 
-from volery.runtime.build.worlds import build_city, build_forest, build_terrain
+from volery.runtime.construction.worlds import build_city, build_forest, build_terrain
 from volery.scenario.load import load_scenario
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,7 @@ from typing import Any
 
 from volery import Simulation, load_scenario
 from volery.core.errors import VoleryError
-from volery.runtime.build.sensor_suites import RESULT_OF
+from volery.runtime.construction.sensor_suites import RESULT_OF
 from volery.scenario import library
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario

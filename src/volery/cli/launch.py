@@ -72,7 +72,7 @@ def start_profile(
     access: which modules may run; None: the access of a scenario made by a program.
     """
     from volery.bridges.nodes.profile import absolute_names
-    from volery.runtime.build.node_loading import start_node
+    from volery.runtime.construction.node_loading import start_node
     from volery.scenario.schema import NodeEntry
 
     names = absolute_names(profile.remap, profile.namespace)

@@ -45,7 +45,7 @@ def export(
 ) -> None:
     """Write the world of a scenario as glTF: ground, trees, buildings."""
     from volery import load_scenario
-    from volery.runtime.build.world_export import export_world
+    from volery.runtime.construction.world_export import export_world
     from volery.world.trees import DetailLevel
 
     if file.suffix.lower() != ".glb":

@@ -43,7 +43,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
-    from volery.runtime.build.node_loading import start_node
+    from volery.runtime.construction.node_loading import start_node
     from volery.runtime.warmup.parallel_compilation import compile_all
     from volery.scenario.access import ScenarioAccess
     from volery.scenario.schema import NodeEntry

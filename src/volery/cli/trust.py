@@ -71,7 +71,7 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
 
 def _local_modules(nodes: Iterable[str], access: ScenarioAccess) -> list[str]:
     """Returns the modules of nodes that lie beside their scenario."""
-    from volery.runtime.build.node_loading import is_local
+    from volery.runtime.construction.node_loading import is_local
 
     named = dict.fromkeys(node_module(node) for node in nodes)
     return [module for module in named if module is not None and is_local(module, access)]

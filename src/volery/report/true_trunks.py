@@ -10,7 +10,7 @@ import numpy as np
 from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.core.arrays import Array
 from volery.core.errors import VoleryError
-from volery.runtime.build.worlds import build_city, build_forest, build_terrain
+from volery.runtime.construction.worlds import build_city, build_forest, build_terrain
 from volery.runtime.replay.scenario_record import scenario_of
 
 _NEAR_M = 15.0

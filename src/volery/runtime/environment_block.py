@@ -18,10 +18,10 @@ from volery.core.errors import CommandError, DivergenceError, SensorError
 from volery.core.rng import stream_key
 from volery.engine.engine import Engine
 from volery.engine.events import Event
-from volery.runtime.build.estimation import build_estimation
-from volery.runtime.build.fleet import add_bodies, build_fleet
-from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
-from volery.runtime.build.sensors import build_banks
+from volery.runtime.construction.estimation import build_estimation
+from volery.runtime.construction.fleet import add_bodies, build_fleet
+from volery.runtime.construction.sensor_suites import SensorInstance, fit_sensors, refit
+from volery.runtime.construction.sensors import build_banks
 from volery.runtime.environment_parameters import rows_of_environments
 from volery.runtime.environment_streams import EnvironmentStreams
 from volery.runtime.environment_worlds import EnvironmentWorlds, take_off

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.rng import stream_key
-from volery.runtime.build.sensor_suites import SensorInstance, stream_name
+from volery.runtime.construction.sensor_suites import SensorInstance, stream_name
 from volery.sensors.bank import Bank
 
 

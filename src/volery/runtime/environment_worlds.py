@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.errors import ScenarioError
-from volery.runtime.build.fleet import build_fleet, place
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
+from volery.runtime.construction.fleet import build_fleet, place
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.schema import Scenario
 from volery.world.city import City
 from volery.world.forest import Forest

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
-from volery.runtime.build.grid_map import blocks_of, read_grid_map
+from volery.runtime.construction.grid_map import blocks_of, read_grid_map
 from volery.scenario.schema import Scenario
 from volery.world.grid_maps import GridMap
 from volery.world.scene import Solid

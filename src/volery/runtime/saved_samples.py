@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.engine.engine import SensorBank
-from volery.runtime.build.sensor_suites import RESULT_OF
+from volery.runtime.construction.sensor_suites import RESULT_OF
 from volery.sensors.samples import JointAngles, Samples
 
 

@@ -20,14 +20,6 @@ from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.session import Gateway
-from volery.runtime.build.engine import build_engine
-from volery.runtime.build.gateway import build_gateway
-from volery.runtime.build.geometry import Geometry, WorldTopic
-from volery.runtime.build.graph import all_down, plan_faults
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.start_check import check_start
-from volery.runtime.build.vehicles import build_vehicles
-from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.conditional_runs import (
     CHECK_PERIOD_S,
@@ -35,6 +27,14 @@ from volery.runtime.conditional_runs import (
     Awaited,
     ConditionalRuns,
 )
+from volery.runtime.construction.engine import build_engine
+from volery.runtime.construction.gateway import build_gateway
+from volery.runtime.construction.geometry import Geometry, WorldTopic
+from volery.runtime.construction.graph import all_down, plan_faults
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.start_check import check_start
+from volery.runtime.construction.vehicles import build_vehicles
+from volery.runtime.construction.worlds import build_world
 from volery.runtime.division_parts import DivisionParts
 from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.facets.clock import SimulationClock

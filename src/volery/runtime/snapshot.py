@@ -15,7 +15,7 @@ from volery.core.saved_state import Stateful
 from volery.core.uncopied import Uncopied
 from volery.engine.lock_step import Partner
 from volery.graph.nodes.node import Node
-from volery.runtime.build.placement import StartPose
+from volery.runtime.construction.placement import StartPose
 
 NodeKey = tuple[str, int]
 """Namespace of a node, and its index among the nodes of that namespace."""

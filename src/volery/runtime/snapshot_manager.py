@@ -11,9 +11,9 @@ from volery.core.errors import SnapshotError
 from volery.engine.lock_step import Partner
 from volery.engine.sensor_restart import NamedStreams
 from volery.graph.nodes.node import Node
-from volery.runtime.build.fleet import check_free
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.sensor_suites import SensorInstance
+from volery.runtime.construction.fleet import check_free
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.sensor_suites import SensorInstance
 from volery.runtime.grid_map_manager import GridMapManager
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.snapshot import (

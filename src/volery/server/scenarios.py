@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
 from volery.core.errors import VoleryError
-from volery.runtime.build.world_asset import kind_of
+from volery.runtime.construction.world_asset import kind_of
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario

@@ -19,7 +19,7 @@ from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, WebSocketSession
 from volery.graph.session import Gateway
-from volery.runtime.build.geometry import Geometry
+from volery.runtime.construction.geometry import Geometry
 from volery.runtime.vehicles.control_authority import ControlAuthority
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario

@@ -6,8 +6,8 @@ import asyncio
 import gzip
 from dataclasses import dataclass
 
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.world_asset import asset_of
+from volery.runtime.construction.geometry import Geometry
+from volery.runtime.construction.world_asset import asset_of
 from volery.scenario.schema import Scenario
 from volery.world.trees.model import DetailLevel
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from volery.core.errors import ScenarioError, VoleryError
-from volery.runtime.build.node_loading import find_function
+from volery.runtime.construction.node_loading import find_function
 from volery.scenario.expectations import Expectation, PredicateExpectation, names_of
 from volery.scenario.schema import Scenario
 from volery.verdicts import path_checks, topic_checks

@@ -15,7 +15,7 @@ from volery.core.errors import VoleryError
 from volery.graph.messages import Image, LaserScan, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
-from volery.runtime.build.partition import Partition
+from volery.runtime.construction.partition import Partition
 from volery.scenario.load import parse_scenario
 
 HERE = Path(__file__).stem

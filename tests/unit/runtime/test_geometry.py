@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from volery import Simulation, load_scenario
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.world_asset import kind_of
+from volery.runtime.construction.geometry import Geometry
+from volery.runtime.construction.world_asset import kind_of
 from volery.scenario import overrides
 from volery.world.forest import procedural_forest
 from volery.world.materials import Material

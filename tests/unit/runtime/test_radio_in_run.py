@@ -11,7 +11,7 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.graph.messages import String
 from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
-from volery.runtime.build.line_of_sight import LineOfSight
+from volery.runtime.construction.line_of_sight import LineOfSight
 from volery.scenario.load import parse_scenario
 
 TOPICS = [{"name": "hello", "type": "std_msgs/msg/String"}]

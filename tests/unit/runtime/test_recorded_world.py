@@ -1,7 +1,7 @@
 """What stood where a log was flown."""
 
 from volery.runtime import Simulation
-from volery.runtime.build.worlds import geometry_of
+from volery.runtime.construction.worlds import geometry_of
 from volery.scenario.load import parse_scenario
 
 

@@ -9,7 +9,7 @@ from service_calls import ask
 
 from volery.core.errors import CommandError
 from volery.runtime import Simulation
-from volery.runtime.build.worlds import build_forest, build_terrain
+from volery.runtime.construction.worlds import build_forest, build_terrain
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.changes import Changes, WorldRequest, apply

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import DataFileError
-from volery.runtime.build.worlds import build_weather
+from volery.runtime.construction.worlds import build_weather
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.world.weather import W20_M_S, Gust, LogProfile, PowerProfile, Weather
 

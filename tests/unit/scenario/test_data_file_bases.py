@@ -1,8 +1,8 @@
 import pytest
 
 from volery.core.errors import DataFileError
-from volery.runtime.build.fleet import add_bodies
-from volery.runtime.build.placement import StartPose
+from volery.runtime.construction.fleet import add_bodies
+from volery.runtime.construction.placement import StartPose
 from volery.sensors.beam_file import read_beams
 from volery.sensors.imu import ImuModel
 from volery.sensors.lidar_model import load_lidar

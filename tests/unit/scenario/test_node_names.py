@@ -8,7 +8,7 @@ import pytest
 
 from volery.core.errors import ScenarioError
 from volery.graph.nodes.node import Node
-from volery.runtime.build.node_loading import find_node
+from volery.runtime.construction.node_loading import find_node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import parse_scenario
 from volery.scenario.node_names import (

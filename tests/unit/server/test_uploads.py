@@ -9,7 +9,7 @@ from page_bench import ask, serving
 from PIL import Image
 
 from volery.core.errors import VoleryError
-from volery.runtime.build.worlds import build_forest, build_solids, build_terrain
+from volery.runtime.construction.worlds import build_forest, build_solids, build_terrain
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario
 from volery.server.uploads import kinds, scenario_builder

@@ -6,7 +6,7 @@ from PIL import Image
 
 from volery.autonomy.mapping.grid_files import write_grid
 from volery.core.errors import DataFileError
-from volery.runtime.build.grid_map import starting_grid_map
+from volery.runtime.construction.grid_map import starting_grid_map
 from volery.scenario.load import parse_scenario
 from volery.world.grid_maps import read_cells, read_map_server
 

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from volery.core.errors import DataFileError, ScenarioError
-from volery.runtime.build.user_meshes import mesh_solids
+from volery.runtime.construction.user_meshes import mesh_solids
 from volery.scenario.load import parse_scenario
 from volery.world import mesh_files
 from volery.world.materials import Material

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from volery.core.errors import DataFileError, ScenarioError
-from volery.runtime.build.user_meshes import mesh_solids
-from volery.runtime.build.worlds import geometry_of
+from volery.runtime.construction.user_meshes import mesh_solids
+from volery.runtime.construction.worlds import geometry_of
 from volery.scenario.load import parse_scenario
 from volery.world.mesh_files import read_mesh
 

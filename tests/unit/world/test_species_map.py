@@ -3,7 +3,7 @@ import logging
 import pytest
 
 from volery.core.errors import ScenarioError
-from volery.runtime.build.worlds import build_forest, build_terrain
+from volery.runtime.construction.worlds import build_forest, build_terrain
 from volery.scenario.load import load_scenario
 from volery.world import species_map
 

@@ -10,8 +10,8 @@ import pytest
 
 from volery.core import rotations
 from volery.core.errors import ScenarioError
-from volery.runtime.build.actors import build_actors
-from volery.runtime.build.worlds import build_scene, build_terrain
+from volery.runtime.construction.actors import build_actors
+from volery.runtime.construction.worlds import build_scene, build_terrain
 from volery.scenario.load import parse_scenario
 from volery.world.actors.motions import AttachedMotion, GivenMotion, WaypointMotion
 from volery.world.actors.tags import CELLS, FACE_M, code_words, tag_cells, tag_corners, tag_shape

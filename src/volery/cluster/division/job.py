@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from volery.core.errors import DivisionError
-from volery.runtime.build.partition import Partition
+from volery.runtime.construction.partition import Partition
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.file_names import texts_of
 from volery.scenario.load import parse_scenario

@@ -25,7 +25,7 @@ from volery.core.errors import DivisionError, VoleryError, reason_of
 from volery.core.machine import describe_versions, usable_cores
 from volery.core.plurals import counted
 from volery.engine.engine import Division
-from volery.runtime.build.partition import Partition
+from volery.runtime.construction.partition import Partition
 from volery.runtime.division_parts import DivisionParts
 from volery.scenario.schema import Scenario
 

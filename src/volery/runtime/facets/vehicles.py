@@ -14,8 +14,8 @@ from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.graph.nodes.node import Node
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.sensor_suites import lidar_mounts
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.sensor_suites import lidar_mounts
 from volery.runtime.snapshot_manager import SnapshotManager
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
 from volery.runtime.vehicles.flight_futures import FlightFutures

@@ -13,7 +13,7 @@ from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
-from volery.runtime.build.worlds import BuiltWorld
+from volery.runtime.construction.worlds import BuiltWorld
 from volery.runtime.grid_map_manager import GridMapManager
 from volery.runtime.services.weather_messages import WeatherTopics
 from volery.scenario.schema import World

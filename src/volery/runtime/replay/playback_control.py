@@ -18,8 +18,8 @@ from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
 from volery.core.errors import CommandError, RecordingError, VoleryError
 from volery.engine.command_queue import CommandQueue
 from volery.graph.graph import Graph
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.worlds import geometry_of
+from volery.runtime.construction.geometry import Geometry
+from volery.runtime.construction.worlds import geometry_of
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.services.simulation_state import RunState
 from volery.scenario import library

@@ -9,7 +9,7 @@ import numpy as np
 
 from volery.graph.graph import Graph
 from volery.graph.messages import Vector3
-from volery.runtime.build.placement import StartPose
+from volery.runtime.construction.placement import StartPose
 from volery.runtime.services.entities import pose_message
 from volery.runtime.services.filters import BoundsType, tag_filter
 from volery.runtime.services.results import Fields, RefusedError, ResultCode, filled, offer_result

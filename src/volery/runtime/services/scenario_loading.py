@@ -9,7 +9,7 @@ from typing import Any
 
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.runtime.build.start_check import check_start
+from volery.runtime.construction.start_check import check_start
 from volery.runtime.services.results import Fields, offer_command
 from volery.scenario import changes as scenario_changes
 from volery.scenario.changes import Changes, WorldRequest

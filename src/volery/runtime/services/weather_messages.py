@@ -10,7 +10,7 @@ from typing import Any
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, Vector3, header, message_type
-from volery.runtime.build.worlds import sun_in
+from volery.runtime.construction.worlds import sun_in
 from volery.scenario.schema import World
 from volery.world.weather import Gust, LogProfile, Weather
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
-from volery.runtime.build.start_check import check_start
+from volery.runtime.construction.start_check import check_start
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.results import (
     Fields,

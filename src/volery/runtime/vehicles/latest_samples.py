@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from volery.engine.engine import SensorBank
-from volery.runtime.build.sensor_suites import SensorInstance
+from volery.runtime.construction.sensor_suites import SensorInstance
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.sensors.mount import Mount
 from volery.sensors.sample_rows import sample_of

@@ -22,14 +22,14 @@ from volery.engine.sensor_restart import NamedStreams
 from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
-from volery.runtime.build.assembly import Assembly, assemble
-from volery.runtime.build.fleet import add_bodies
-from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.placement import StartPose, check_room
-from volery.runtime.build.sensor_suites import SensorInstance, refit
 from volery.runtime.conditional_runs import ConditionalRuns
-from volery.runtime.monitoring.output_sink import OutputSink
+from volery.runtime.construction.assembly import Assembly, assemble
+from volery.runtime.construction.fleet import add_bodies
+from volery.runtime.construction.graph import announce_sensors, start_nodes, start_system_nodes
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.placement import StartPose, check_room
+from volery.runtime.construction.sensor_suites import SensorInstance, refit
+from volery.runtime.output_sink import OutputSink
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.vehicles.battery_failsafe import BatteryFailsafe
 from volery.runtime.vehicles.command_interface import open_commands

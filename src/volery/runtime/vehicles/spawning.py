@@ -18,7 +18,7 @@ from volery.core.errors import (
     SpawnFault,
     VoleryError,
 )
-from volery.runtime.build.placement import (
+from volery.runtime.construction.placement import (
     StartPose,
     check_place,
     put_down,

@@ -13,7 +13,7 @@ from volery.control.setpoints import checked_attitude
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
-from volery.runtime.build.placement import (
+from volery.runtime.construction.placement import (
     StartPose,
     check_place,
     put_down,

@@ -10,7 +10,7 @@ from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.geodesy import LocalFrame
 from volery.engine.collisions import BOUNCE, Collisions
-from volery.runtime.build.worlds import light_of
+from volery.runtime.construction.worlds import light_of
 from volery.scenario.schema import World
 from volery.sensors.bank import SensorGroup
 from volery.sensors.gnss import GnssBank, GnssModel

@@ -7,7 +7,7 @@ from importlib import import_module
 
 from volery.core.errors import DataFileError, ScenarioError
 from volery.graph.nodes.node import Node
-from volery.runtime.build.node_loading import find_node
+from volery.runtime.construction.node_loading import find_node
 from volery.runtime.warmup import core_tasks
 from volery.runtime.warmup.tasks import Task
 from volery.scenario.node_names import registered_nodes

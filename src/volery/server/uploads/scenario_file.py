@@ -11,7 +11,7 @@ from pathlib import Path
 
 from volery.core.errors import ScenarioError, reason_of
 from volery.core.toml_text import parse_toml
-from volery.runtime.build.node_loading import find_node
+from volery.runtime.construction.node_loading import find_node
 from volery.scenario.schema import Scenario
 from volery.server.uploads.kinds import MAX_UAVS
 

@@ -24,8 +24,13 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
     Raises VoleryError if the file is invalid, or there is no room for a UAV.
     """
-    from volery.runtime.build.fleet import check_types, place
-    from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
+    from volery.runtime.construction.fleet import check_types, place
+    from volery.runtime.construction.worlds import (
+        build_city,
+        build_forest,
+        build_scene,
+        build_terrain,
+    )
     from volery.scenario.load import load_scenario
     from volery.server.uploads.scenario_file import check_contents, text_of
 

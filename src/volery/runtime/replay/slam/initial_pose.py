@@ -9,8 +9,8 @@ from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError
 from volery.graph.messages import frame_of
-from volery.runtime.build.fleet import place
-from volery.runtime.build.worlds import build_world
+from volery.runtime.construction.fleet import place
+from volery.runtime.construction.worlds import build_world
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.replay.slam.extrinsics import ExtrinsicsLog
 

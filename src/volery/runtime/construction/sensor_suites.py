@@ -14,7 +14,7 @@ from volery.core import rotations
 from volery.core.errors import DataFileError, ScenarioError
 from volery.core.rng import stream_key
 from volery.publishing.lidar_publishing import lidar_topic
-from volery.runtime.build.placement import StartPose
+from volery.runtime.construction.placement import StartPose
 from volery.scenario import schema
 from volery.scenario.camera import CameraSensor
 from volery.sensors.lidar_model import LidarModel, load_lidar

@@ -10,11 +10,11 @@ from volery.core.arrays import Array
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
-from volery.runtime.build.engine import ConnectedEngine
-from volery.runtime.build.line_of_sight import LineOfSight
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.worlds import BuiltWorld
 from volery.runtime.conditional_runs import ConditionalRuns
+from volery.runtime.construction.engine import ConnectedEngine
+from volery.runtime.construction.line_of_sight import LineOfSight
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.worlds import BuiltWorld
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.scenario.schema import Scenario
 from volery.world.forest import Forest

@@ -9,12 +9,12 @@ from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
 from volery.publishing.graph_publisher import GraphPublisher
-from volery.runtime.build.assembly import Assembly, assemble
-from volery.runtime.build.fleet import place
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.worlds import BuiltWorld
-from volery.runtime.monitoring.output_sink import OutputSink
+from volery.runtime.construction.assembly import Assembly, assemble
+from volery.runtime.construction.fleet import place
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.worlds import BuiltWorld
+from volery.runtime.output_sink import OutputSink
 from volery.scenario.schema import Scenario
 
 

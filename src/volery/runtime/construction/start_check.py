@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from volery.core.errors import DataFileError
-from volery.runtime.build.fleet import check_types
-from volery.runtime.build.message_loading import learn_messages
-from volery.runtime.build.node_loading import check_nodes
+from volery.runtime.construction.fleet import check_types
+from volery.runtime.construction.message_loading import learn_messages
+from volery.runtime.construction.node_loading import check_nodes
 from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 

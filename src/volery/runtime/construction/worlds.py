@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
-from volery.runtime.build.actors import build_actors
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.grid_map import starting_blocks
-from volery.runtime.build.user_meshes import mesh_solids
+from volery.runtime.construction.actors import build_actors
+from volery.runtime.construction.geometry import Geometry
+from volery.runtime.construction.grid_map import starting_blocks
+from volery.runtime.construction.user_meshes import mesh_solids
 from volery.scenario import wind as schema
 from volery.scenario.schema import (
     GridTerrain,

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from volery.control.fleet import Fleet
 from volery.engine.engine import SensorBank
-from volery.runtime.build.estimation import build_estimation
-from volery.runtime.build.fleet import add_bodies, build_fleet
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors
-from volery.runtime.build.sensors import build_banks
+from volery.runtime.construction.estimation import build_estimation
+from volery.runtime.construction.fleet import add_bodies, build_fleet
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.sensor_suites import SensorInstance, fit_sensors
+from volery.runtime.construction.sensors import build_banks
 from volery.scenario.schema import Scenario
 from volery.world.scene import Scene
 

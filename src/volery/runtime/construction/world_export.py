@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from volery.core.whole_files import write_whole
-from volery.runtime.build.worlds import geometry_of
+from volery.runtime.construction.worlds import geometry_of
 from volery.scenario.schema import Scenario
 from volery.sensors.cameras.light import base_colours
 from volery.world.gltf import glb_of

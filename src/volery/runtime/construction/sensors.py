@@ -12,10 +12,10 @@ from volery.control.fleet import Fleet
 from volery.core.clock import Schedule, ns_from_s
 from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
-from volery.runtime.build.geo_reference import denial, local_frame, magnetic_field_map
-from volery.runtime.build.partition import DIVIDED_SENSORS, WHOLE, Partition
-from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstance
-from volery.runtime.build.worlds import light_of
+from volery.runtime.construction.geo_reference import denial, local_frame, magnetic_field_map
+from volery.runtime.construction.partition import DIVIDED_SENSORS, WHOLE, Partition
+from volery.runtime.construction.sensor_suites import PICTURE, RESULT_OF, SensorInstance
+from volery.runtime.construction.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank, SensorGroup
 from volery.sensors.barometer import BarometerBank, BarometerModel

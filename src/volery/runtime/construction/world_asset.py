@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.worlds import build_weather, sun_in
+from volery.runtime.construction.geometry import Geometry
+from volery.runtime.construction.worlds import build_weather, sun_in
 from volery.scenario.schema import Scenario
 from volery.sensors.cameras.light import base_colours
 from volery.world.gltf import instanced_glb_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
-from volery.runtime.build.geo_reference import magnetic_field_map
+from volery.runtime.construction.geo_reference import magnetic_field_map
 from volery.scenario.schema import FlatTerrain, Scenario
 from volery.sensors.gnss import GnssModel
 from volery.sensors.imu import ImuModel
@@ -19,7 +19,7 @@ from volery.sensors.sonar import SonarModel
 if TYPE_CHECKING:
     from volery.control.estimator.settings import EstimatorSettings, Mounting
     from volery.engine.estimation import Estimation
-    from volery.runtime.build.sensor_suites import SensorInstance
+    from volery.runtime.construction.sensor_suites import SensorInstance
 
 _AIDS = ("imu", "gnss", "barometer", "magnetometer", "sonar")
 _START_M, _START_M_S, _START_TILT_RAD, _START_HEADING_RAD = 0.5, 0.02, 0.01, 0.03

@@ -12,8 +12,8 @@ from volery.control.flight_modes import FlightMode
 from volery.control.gains import ControlRates
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.core.plurals import counted
-from volery.runtime.build.placement import StartPose, place_uavs
-from volery.runtime.build.worlds import build_weather
+from volery.runtime.construction.placement import StartPose, place_uavs
+from volery.runtime.construction.worlds import build_weather
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from volery.comms.radio.path_loss import Paths
 from volery.core.arrays import Array
-from volery.runtime.build.radio_crowns import Crowns
+from volery.runtime.construction.radio_crowns import Crowns
 from volery.world.forest import Forest
 from volery.world.materials import Material
 from volery.world.scene import Hits, Scene

@@ -18,10 +18,10 @@ from volery.graph.graph import Graph
 from volery.graph.nodes.node import Context, Node
 from volery.publishing.camera_messages import Camera
 from volery.publishing.graph_publisher import GraphPublisher
-from volery.runtime.build.node_loading import start_node
-from volery.runtime.build.partition import WHOLE, Partition
-from volery.runtime.build.placement import StartPose
-from volery.runtime.build.sensor_suites import RESULT_OF, SensorInstance
+from volery.runtime.construction.node_loading import start_node
+from volery.runtime.construction.partition import WHOLE, Partition
+from volery.runtime.construction.placement import StartPose
+from volery.runtime.construction.sensor_suites import RESULT_OF, SensorInstance
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.camera import CameraSensor
 from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
