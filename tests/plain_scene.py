@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.workers import Workers
-from volery.sensors.lidar import Echoes, RayBatch, move_bodies, scan_rays
-from volery.sensors.lidar_model import LidarModel
-from volery.sensors.measurement_kernels import Surfaces, measure_scan
+from volery.sensors.lidar.lidar import Echoes, RayBatch, move_bodies, scan_rays
+from volery.sensors.lidar.lidar_model import LidarModel
+from volery.sensors.lidar.measurement_kernels import Surfaces, measure_scan
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.ground_cover import ground_material
 from volery.world.mesh import Mesh, concatenate

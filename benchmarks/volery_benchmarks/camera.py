@@ -21,7 +21,7 @@ from volery.scenario.load import parse_scenario
 from volery.sensors.cameras.camera import take
 from volery.sensors.cameras.light import make_light
 from volery.sensors.cameras.model import CameraModel
-from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.lidar.lidar import make_batch, stack_mounts
 from volery.sensors.mount import make_mount
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain

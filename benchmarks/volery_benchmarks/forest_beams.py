@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from volery.core.arrays import Array
-from volery.sensors.lidar import RayBatch, make_batch, scan_rays, stack_mounts
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar import RayBatch, make_batch, scan_rays, stack_mounts
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.sensors.mount import make_mount
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.forest import Forest, procedural_forest

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from volery.core.arrays import Array
-from volery.sensors.lidar import sample_lidars
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar import sample_lidars
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.world.mesh import Mesh, concatenate
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain

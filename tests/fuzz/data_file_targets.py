@@ -15,8 +15,8 @@ from toml_mutation import changed_text, toml_of, write
 import volery
 from volery.scenario.data_files import load_data_file
 from volery.scenario.load import load_scenario
-from volery.sensors.beam_file import read_beams
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.beam_file import read_beams
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe
 from volery.world.inventory import read_inventory
 from volery.world.terrain import Terrain

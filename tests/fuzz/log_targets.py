@@ -20,7 +20,7 @@ from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import String, Twist, Vector3
 from volery.logs.ulog_source import UlogSource
-from volery.mavlink.autopilot.ulog import UlogTopic, header, logged_text, text_info
+from volery.mavlink.autopilot.logs.ulog import UlogTopic, header, logged_text, text_info
 
 STRING = "std_msgs/msg/String"
 TWIST = "geometry_msgs/msg/Twist"

@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "unit" / "sensors"))
 from scanning import echoes_of, solids
 from scene_samples import cylinder
 
-from volery.sensors.lidar_model import load_lidar
-from volery.sensors.particle_echoes import particle_table
+from volery.sensors.lidar.lidar_model import load_lidar
+from volery.sensors.lidar.particle_echoes import particle_table
 from volery.world.weather import Particles
 
 SCANS = 60

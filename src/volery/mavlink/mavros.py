@@ -32,10 +32,12 @@ from volery.graph.messages import (
     header,
     message_type,
 )
-from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
-from volery.mavlink.autopilot.command_protocol import Command
-from volery.mavlink.autopilot.modes import mode_named
-from volery.mavlink.autopilot.setpoints import OffboardSetpoint, from_body, from_heading
+from volery.mavlink.autopilot.modes import mode_transitions, offboard
+from volery.mavlink.autopilot.modes.modes import mode_named
+from volery.mavlink.autopilot.modes.setpoints import OffboardSetpoint, from_body, from_heading
+from volery.mavlink.autopilot.protocols import commands
+from volery.mavlink.autopilot.protocols.command_protocol import Command
+from volery.mavlink.autopilot.safety import arming
 
 if TYPE_CHECKING:
     from volery.graph.nodes.node import Node

@@ -20,9 +20,10 @@ import numpy as np
 from volery.core.errors import NodeError
 from volery.graph.messages import FluidPressure, NavSatFix, Temperature, message_type
 from volery.graph.nodes.node import Node
-from volery.mavlink.autopilot import core, streams
+from volery.mavlink.autopilot import core
 from volery.mavlink.autopilot.graph_vehicle import GraphVehicle, build_of, state_of
-from volery.mavlink.autopilot.log_transfer import TransferRate
+from volery.mavlink.autopilot.messages import streams
+from volery.mavlink.autopilot.protocols.log_transfer import TransferRate
 from volery.mavlink.autopilot.state import AutopilotState
 from volery.mavlink.mavros import Mavros
 

@@ -48,7 +48,7 @@ from volery.publishing.lidar_publishing import LidarPublisher, laser_frame
 from volery.publishing.navigation_messages import NAVIGATION_TOPICS
 from volery.publishing.sensor_topics import SensorTopic
 from volery.publishing.transforms import transforms_of_odometry
-from volery.sensors.lidar_model import LidarModel
+from volery.sensors.lidar.lidar_model import LidarModel
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
     BatterySamples,

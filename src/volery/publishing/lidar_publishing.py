@@ -24,11 +24,11 @@ from volery.graph.messages import (
 )
 from volery.graph.topics import Publisher
 from volery.publishing.lidar_returns import ReturnsPublisher
-from volery.sensors.lidar_model import LidarModel
+from volery.sensors.lidar.lidar_model import LidarModel
+from volery.sensors.lidar.point_cloud import POINT, PointMaker
+from volery.sensors.lidar.scan_patterns import PlanarScan
 from volery.sensors.mount import Mount
-from volery.sensors.point_cloud import POINT, PointMaker
 from volery.sensors.samples import LidarScans, SensorId
-from volery.sensors.scan_patterns import PlanarScan
 
 _NO_INTENSITIES = np.zeros(0, dtype=np.float32)
 _NO_INTENSITIES.flags.writeable = False

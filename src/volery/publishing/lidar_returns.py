@@ -17,9 +17,9 @@ from volery.core.arrays import Array
 from volery.graph.graph import Graph
 from volery.graph.messages import PointCloud2, PointField, header
 from volery.graph.topics import Publisher
+from volery.sensors.lidar.scan_patterns import PlanarScan, ScanPattern
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import LidarScans, SensorId
-from volery.sensors.scan_patterns import PlanarScan, ScanPattern
 
 MOST_RETURNS = 360
 """Maximum returns of a planar sweep: one per degree of the horizon ..."""

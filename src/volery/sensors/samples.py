@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.model import CameraModel
-from volery.sensors.lidar_model import LidarModel
+from volery.sensors.lidar.lidar_model import LidarModel
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.cloud import organised_points
 from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.cameras.model import CameraModel
-from volery.sensors.lidar_model import LidarModel
+from volery.sensors.lidar.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.vehicle.battery import BatteryLevel
 

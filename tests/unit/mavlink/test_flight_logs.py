@@ -9,8 +9,8 @@ import pytest
 from flying_bench import Station, fly
 from pyulog import ULog
 
-from volery.mavlink.autopilot import log_storage
-from volery.mavlink.autopilot.log_storage import LogStorage
+from volery.mavlink.autopilot.logs import log_storage
+from volery.mavlink.autopilot.logs.log_storage import LogStorage
 
 PERIODS_S = {
     "vehicle_attitude": 0.05,

@@ -10,7 +10,7 @@ import pytest
 from flying_bench import LINK, NAN, Station, fly
 
 from volery.core import rotations
-from volery.mavlink.autopilot.status_messages import status_texts
+from volery.mavlink.autopilot.messages.status_messages import status_texts
 from volery.mavlink.codec import dialect
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED, BAD_FRAME = 0, 1, 2, 3, 4, 9

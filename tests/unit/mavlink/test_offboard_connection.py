@@ -12,8 +12,8 @@ from volery.core.errors import BridgeError, GraphError, UnreachableError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.connection import call_and_wait
 from volery.graph.messages import Quaternion, Twist, Vector3
-from volery.mavlink.autopilot.setpoints import attitude_setpoint as autopilot_attitude
-from volery.mavlink.autopilot.setpoints import local_setpoint
+from volery.mavlink.autopilot.modes.setpoints import attitude_setpoint as autopilot_attitude
+from volery.mavlink.autopilot.modes.setpoints import local_setpoint
 from volery.mavlink.codec import dialect
 from volery.mavlink.offboard.connection import OffboardConnection
 from volery.mavlink.offboard.conversions import attitude_setpoint, odometry, velocity_setpoint

@@ -9,8 +9,8 @@ from collections import Counter
 import pytest
 from flying_bench import NAN, PACKETS, Station, fly
 
+from volery.mavlink.autopilot.messages.streams import RATES_HZ
 from volery.mavlink.autopilot.parameters import DEFAULTS, NAMES
-from volery.mavlink.autopilot.streams import RATES_HZ
 from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.framing import lengths_of
 

@@ -10,7 +10,7 @@ from autopilot_bench import irises
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError
-from volery.mavlink.autopilot.dialect_extensions import available_modes
+from volery.mavlink.autopilot.messages.dialect_extensions import available_modes
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 from volery.mavlink.links import stamp_ledger

@@ -9,7 +9,7 @@ from rosbags.highlevel import AnyReader
 from volery.bridges.logs.log_writer import create_log
 from volery.core.errors import DataFileError, ScenarioError
 from volery.graph.typestore import typestore
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar_model import load_lidar
 
 NUMPY_TYPE = {2: "u1", 4: "<u2", 6: "<u4", 7: "<f4", 8: "<f8"}
 """Datatypes of sensor_msgs/PointField."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from volery.graph.typestore import typestore
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar_model import load_lidar
 
 
 def read(message):

@@ -149,7 +149,7 @@ def test_points_of_a_cloud_return_to_the_wall() -> None:
     """A sweep of 100 ms while the body flies and turns."""
     from collections import deque
 
-    from volery.sensors.point_cloud import POINT
+    from volery.sensors.lidar.point_cloud import POINT
 
     start_ns, mount = 1_015 * MS, MOUNTS["/uav1/laser/horizontal/scan"]
     t = start_ns / 1e9 + np.linspace(0.0, 0.1, 500)

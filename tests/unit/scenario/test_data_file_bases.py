@@ -3,9 +3,9 @@ import pytest
 from volery.core.errors import DataFileError
 from volery.runtime.construction.fleet import add_bodies
 from volery.runtime.construction.placement import StartPose
-from volery.sensors.beam_file import read_beams
 from volery.sensors.imu import ImuModel
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.beam_file import read_beams
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.identified import load_identified
 

@@ -28,7 +28,7 @@ def test_every_schema_has_bounds():
     import volery.control.estimator.settings
     import volery.scenario.schema
     import volery.sensors.cameras.model
-    import volery.sensors.lidar_model
+    import volery.sensors.lidar.lidar_model
     import volery.vehicle.airframe
     import volery.world.trees.species  # noqa: F401
 

@@ -8,7 +8,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "world"))
 
 from volery.core import rotations
-from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
+from volery.sensors.lidar.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.mount import make_mount
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.materials import Material

@@ -7,10 +7,10 @@ from scanning import DT_NS, LEVEL, echoes_of, flying, solids, standing
 from scene_samples import cylinder, drone_shape, small_forest, wall
 
 from volery.core import rotations
-from volery.sensors.lidar import make_batch, sample_echoes, sample_lidars, stack_mounts
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar import make_batch, sample_echoes, sample_lidars, stack_mounts
+from volery.sensors.lidar.lidar_model import load_lidar
+from volery.sensors.lidar.point_cloud import POINT, PointMaker
 from volery.sensors.mount import make_mount
-from volery.sensors.point_cloud import POINT, PointMaker
 from volery.sensors.samples import LidarScans, SensorId
 from volery.vehicle.pose_history import new_history
 from volery.world.scene import Scene

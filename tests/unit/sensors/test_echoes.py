@@ -5,7 +5,7 @@ import pytest
 from scanning import echoes_of, solids, standing
 from scene_samples import cylinder, wall
 
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.world.materials import REFLECTIVITY, Material
 from volery.world.mesh import Mesh
 from volery.world.scene import Scene, Solid

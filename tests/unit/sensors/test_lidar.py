@@ -15,8 +15,8 @@ from scene_samples import cylinder, drone_shape, small_forest, wall
 from volery.core import rotations
 from volery.core.errors import DataFileError
 from volery.core.rng import stream_key
-from volery.sensors.lidar import make_batch, sample_echoes, sample_lidars, stack_mounts
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar import make_batch, sample_echoes, sample_lidars, stack_mounts
+from volery.sensors.lidar.lidar_model import load_lidar
 from volery.sensors.mount import make_mount, nodding_angle_at
 from volery.vehicle.pose_history import PoseHistory, new_history
 from volery.world.materials import Material

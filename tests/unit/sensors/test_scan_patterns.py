@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from volery.core.errors import DataFileError
-from volery.sensors.beam_table import KNOTS_APART_NS, LANES
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.beam_table import KNOTS_APART_NS, LANES
+from volery.sensors.lidar.lidar_model import load_lidar
 
 RINGS = {"vlp_16": 16, "hdl_32e": 32, "os1_64": 64, "os1_128": 128}
 MODELS = ["utm_30lx", "utm_30lx_ew", *RINGS, "mid_40"]

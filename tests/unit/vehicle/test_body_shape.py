@@ -7,7 +7,7 @@ from volery.core import rotations
 from volery.sensors.cameras.camera import take
 from volery.sensors.cameras.light import make_light
 from volery.sensors.cameras.model import CameraModel
-from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.lidar.lidar import make_batch, stack_mounts
 from volery.sensors.mount import make_mount
 from volery.vehicle.airframe import airframe_names, load_airframe
 from volery.vehicle.body_shape import MATERIAL_OF, body_shape

@@ -14,7 +14,7 @@ from volery.learning.tags.camera import TagCamera
 from volery.learning.tags.detections import TagDetections, no_detections
 from volery.sensors.cameras.camera import Part, take
 from volery.sensors.cameras.light import Light, make_light
-from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.lidar.lidar import make_batch, stack_mounts
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.body_shape import body_shape
 from volery.vehicle.pose_history import new_history

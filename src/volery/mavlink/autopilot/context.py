@@ -6,11 +6,11 @@ import math
 
 from volery.core.errors import CommandError
 from volery.mavlink.autopilot.client_links import ClientLinks
-from volery.mavlink.autopilot.flight_log import FlightLog
 from volery.mavlink.autopilot.geo_reference import GeoReference
+from volery.mavlink.autopilot.logs.flight_log import FlightLog
+from volery.mavlink.autopilot.messages.status_messages import heartbeat, status_texts
 from volery.mavlink.autopilot.parameters import Value, refusal
 from volery.mavlink.autopilot.state import AutopilotState
-from volery.mavlink.autopilot.status_messages import heartbeat, status_texts
 from volery.mavlink.autopilot.vehicle import FlightState, Vector, Vehicle, VehicleInfo
 
 _COMPLAINT_NS = 1_000_000_000

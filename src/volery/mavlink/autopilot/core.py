@@ -14,20 +14,15 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import CommandError
-from volery.mavlink.autopilot import (
-    calibration,
-    failsafes,
-    flight_tasks,
-    message_handlers,
-    mode_transitions,
-    requests,
-    streams,
-)
 from volery.mavlink.autopilot.client_links import MOST_LINKS, LinkState
 from volery.mavlink.autopilot.context import AutopilotContext
-from volery.mavlink.autopilot.flight_logger import FlightLogger
-from volery.mavlink.autopilot.mission_protocol import keep_transfers_going
+from volery.mavlink.autopilot.logs.flight_logger import FlightLogger
+from volery.mavlink.autopilot.messages import streams
+from volery.mavlink.autopilot.modes import flight_tasks, mode_transitions
 from volery.mavlink.autopilot.parameters import Value
+from volery.mavlink.autopilot.protocols import calibration, message_handlers, requests
+from volery.mavlink.autopilot.protocols.mission_protocol import keep_transfers_going
+from volery.mavlink.autopilot.safety import failsafes
 from volery.mavlink.autopilot.state import Source
 from volery.mavlink.autopilot.vehicle import FlightState, Vehicle, VehicleInfo
 from volery.mavlink.codec import AUTOPILOT, Parser

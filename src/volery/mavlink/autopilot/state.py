@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from volery.mavlink.autopilot.modes import Mode
+from volery.mavlink.autopilot.modes.modes import Mode
+from volery.mavlink.autopilot.modes.setpoints import OffboardSetpoint
 from volery.mavlink.autopilot.parameters import Value, defaults
-from volery.mavlink.autopilot.plans import MissionItem
-from volery.mavlink.autopilot.setpoints import OffboardSetpoint
+from volery.mavlink.autopilot.protocols.plans import MissionItem
 from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 Source = tuple[int, int, int]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from volery.graph.session import Gateway
-from volery.mavlink.autopilot.streams import GROUND
+from volery.mavlink.autopilot.messages.streams import GROUND
 from volery.mavlink.codec import dialect
 from volery.mavlink.links.connection import MavlinkConnection
 from volery.mavlink.links.serial_line import SerialLine

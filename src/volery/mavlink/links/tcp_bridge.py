@@ -9,7 +9,7 @@ from volery.core.listener import Listener, open_listener
 from volery.core.network_access import check_address, tend, write_while_open
 from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
-from volery.mavlink.autopilot.streams import GROUND
+from volery.mavlink.autopilot.messages.streams import GROUND
 from volery.mavlink.codec import dialect
 from volery.mavlink.links import ports
 from volery.mavlink.links.connection import MavlinkConnection, why_not

@@ -12,7 +12,7 @@ import socket
 from volery.core.errors import BridgeError
 from volery.core.network_access import LOOPBACK, check_address
 from volery.graph.session import Gateway
-from volery.mavlink.autopilot.streams import GROUND, ONBOARD
+from volery.mavlink.autopilot.messages.streams import GROUND, ONBOARD
 from volery.mavlink.codec import dialect
 from volery.mavlink.framing import Framer, lengths_of
 from volery.mavlink.links import ports

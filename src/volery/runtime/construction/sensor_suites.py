@@ -17,7 +17,8 @@ from volery.publishing.lidar_publishing import lidar_topic
 from volery.runtime.construction.placement import StartPose
 from volery.scenario import schema
 from volery.scenario.camera import CameraSensor
-from volery.sensors.lidar_model import LidarModel, load_lidar
+from volery.sensors.lidar.lidar_model import LidarModel, load_lidar
+from volery.sensors.lidar.scan_patterns import PlanarScan
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
     BatterySamples,
@@ -32,7 +33,6 @@ from volery.sensors.samples import (
     Samples,
     SensorId,
 )
-from volery.sensors.scan_patterns import PlanarScan
 
 if TYPE_CHECKING:
     pass

@@ -24,14 +24,14 @@ from volery.sensors.faults import FaultableBank
 from volery.sensors.gnss import GnssBank, GnssModel
 from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
-from volery.sensors.lidar_bank import LidarBank
-from volery.sensors.lidar_model import LidarModel
+from volery.sensors.lidar.lidar_bank import LidarBank
+from volery.sensors.lidar.lidar_model import LidarModel
+from volery.sensors.lidar.scan_patterns import PlanarScan
 from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
 from volery.sensors.odometry import GroundTruthBank, OdometryBank, OdometryModel
 from volery.sensors.samples import (
     JointAngles,
 )
-from volery.sensors.scan_patterns import PlanarScan
 from volery.sensors.sonar import SonarBank, SonarModel
 from volery.world.scene import Scene
 

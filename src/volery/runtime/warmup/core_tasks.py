@@ -16,12 +16,12 @@ from volery.sensors.bank import SensorGroup
 from volery.sensors.gnss import GnssBank, GnssModel
 from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
-from volery.sensors.lidar_bank import LidarBank
-from volery.sensors.lidar_model import load_lidar
+from volery.sensors.lidar.lidar_bank import LidarBank
+from volery.sensors.lidar.lidar_model import load_lidar
+from volery.sensors.lidar.point_cloud import PointMaker
 from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank
-from volery.sensors.point_cloud import PointMaker
 from volery.sensors.samples import SensorId
 from volery.sensors.sonar import SonarBank, SonarModel
 from volery.vehicle.airframe import load_airframe

@@ -12,8 +12,8 @@ from volery.runtime.warmup import core_tasks
 from volery.runtime.warmup.tasks import Task
 from volery.scenario.node_names import registered_nodes
 from volery.scenario.schema import LidarSensor, NodeEntry, Scenario, UavType
-from volery.sensors.lidar_model import load_lidar
-from volery.sensors.scan_patterns import PlanarScan
+from volery.sensors.lidar.lidar_model import load_lidar
+from volery.sensors.lidar.scan_patterns import PlanarScan
 
 _BY_SENSOR: dict[str, Task] = {
     "camera": core_tasks.images,

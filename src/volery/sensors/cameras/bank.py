@@ -15,7 +15,7 @@ from volery.sensors.cameras.camera import EVERY_PART, Images, Part, take
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.precipitation import falling_in
-from volery.sensors.lidar import make_batch, stack_mounts
+from volery.sensors.lidar.lidar import make_batch, stack_mounts
 from volery.sensors.samples import CameraFrames
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
-from volery.sensors.aim_kernels import RayBatch
 from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, render_images
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.pixel_table import PIECE
 from volery.sensors.cameras.precipitation import Falling
 from volery.sensors.cameras.weather_kernels import WeatherView, draw_falling
-from volery.sensors.lidar import move_bodies
+from volery.sensors.lidar.aim_kernels import RayBatch
+from volery.sensors.lidar.lidar import move_bodies
 from volery.vehicle.fleet import RotorTurns
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import LANES

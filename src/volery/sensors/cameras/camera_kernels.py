@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import RayBatch, sensor_frame
 from volery.sensors.cameras.hit_kernels import Scratch, new_scratch, note_hits
 from volery.sensors.cameras.light import CODES, Light
 from volery.sensors.cameras.pixel_table import PIECE, PixelTable
 from volery.sensors.cameras.shade_kernels import shade
 from volery.sensors.cameras.shadow_kernels import find_shadows, shading_bodies
+from volery.sensors.lidar.aim_kernels import RayBatch, sensor_frame
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.body_kernels import body_sphere
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN

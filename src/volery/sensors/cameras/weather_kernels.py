@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import Frame, RayBatch, sensor_frame
 from volery.sensors.cameras.camera_kernels import Frames
 from volery.sensors.cameras.light import CLEAR, CODES, Light
 from volery.sensors.cameras.precipitation import Falling
+from volery.sensors.lidar.aim_kernels import Frame, RayBatch, sensor_frame
 from volery.vehicle.pose_history import PoseHistory
 
 _NEAREST_M = 0.3

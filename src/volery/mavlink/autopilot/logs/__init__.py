@@ -1,0 +1,1 @@
+"""Flight logs in the format of PX4 (ULog)."""

@@ -1,0 +1,1 @@
+"""Builders of the autopilot's messages, and their streams."""

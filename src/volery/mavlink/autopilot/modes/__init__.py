@@ -1,0 +1,1 @@
+"""Flight modes of the autopilot, and the flights of each."""

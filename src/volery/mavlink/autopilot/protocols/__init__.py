@@ -1,0 +1,1 @@
+"""Protocols and commands of clients, and the handlers of their messages."""

@@ -1,0 +1,1 @@
+"""Arming, failsafes, fences and checks of missions."""

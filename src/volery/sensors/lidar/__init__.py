@@ -1,0 +1,1 @@
+"""LIDARs: models, beams, kernels and their bank."""
