@@ -14,7 +14,7 @@ from whole_world import offer_rosapi, whole_data
 from volery.bridges.logs.log_writer import create_log
 from volery.graph.service_reply import ServiceReply
 from volery.runtime.replay.log_player import LogPlayer
-from volery.server.read_only import READ_ONLY_SERVICES
+from volery.server.access_policy import READ_ONLY_SERVICES
 
 TICK_S = 0.001
 FLAT = {

@@ -12,7 +12,7 @@ from volery.graph.messages import String
 from volery.runtime.services import scenario_loading
 from volery.scenario import load
 from volery.scenario.catalog import ScenarioCatalog
-from volery.server.read_only import READ_ONLY_SERVICES
+from volery.server.access_policy import READ_ONLY_SERVICES
 
 
 @pytest.fixture

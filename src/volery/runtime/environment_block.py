@@ -16,16 +16,15 @@ from volery.control.flying_start import FlyingStart
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError, DivergenceError, SensorError
 from volery.core.rng import stream_key
-from volery.engine.engine import Engine
+from volery.engine.engine import Engine, SensorBank
 from volery.engine.events import Event
 from volery.runtime.construction.estimation import build_estimation
 from volery.runtime.construction.fleet import add_bodies, build_fleet
-from volery.runtime.construction.sensor_suites import SensorInstance, fit_sensors, refit
+from volery.runtime.construction.sensor_suites import RESULT_OF, SensorInstance, fit_sensors, refit
 from volery.runtime.construction.sensors import build_banks
 from volery.runtime.environment_parameters import rows_of_environments
 from volery.runtime.environment_streams import EnvironmentStreams
 from volery.runtime.environment_worlds import EnvironmentWorlds, take_off
-from volery.runtime.saved_samples import restored_samples, saved_samples
 from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, FlightRuns
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
@@ -36,7 +35,7 @@ from volery.sensors.cameras.bank import CameraBank
 from volery.sensors.cameras.camera import EVERY_PART, Part
 from volery.sensors.mount import Mount
 from volery.sensors.sample_rows import sample_of
-from volery.sensors.samples import Samples
+from volery.sensors.samples import JointAngles, Samples
 from volery.sensors.sensor_samples import SensorSample
 from volery.world.weather.dryden import turbulence_stream
 from volery.world.world_scenes import WorldScenes
@@ -475,3 +474,21 @@ def _places(banks: Sequence[Bank]) -> dict[tuple[str, str], tuple[int, NDArray[n
         for row, sensor in enumerate(bank.sensors):
             places.setdefault((sensor.uav_name, sensor.name), (k, []))[1].append(row)
     return {names: (k, np.array(rows)) for names, (k, rows) in places.items()}
+
+
+def saved_samples(samples: Samples | None) -> dict[str, Any] | None:
+    """Returns the fields of samples that change, for `restored_samples`; arrays are not copied."""
+    if samples is None:
+        return None
+    return {name: v for name, v in vars(samples).items() if name not in ("sensors", "model")}
+
+
+def restored_samples(bank: SensorBank, fields: dict[str, Any] | None) -> Samples | None:
+    """Returns the samples of `bank` that `saved_samples` saved."""
+    if fields is None:
+        return None
+    model = getattr(getattr(bank, "bank", bank), "model", None)
+    own = {"sensors": bank.sensors} | ({} if model is None else {"model": model})
+    kind: type[Any] = JointAngles if bank.name == "joints" else RESULT_OF[bank.name]
+    made: Samples = kind(**own, **fields)
+    return made

@@ -8,6 +8,7 @@ from typing import Any
 
 from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.wire import Operation
+from volery.core.data_tables import read_table
 from volery.core.errors import BridgeError, CommandError
 from volery.runtime.services.control_authority import HAND_OVER, RELEASE, TAKE
 from volery.runtime.vehicles.control_authority import (
@@ -18,7 +19,10 @@ from volery.runtime.vehicles.control_authority import (
 )
 from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.server.operator_names import OperatorNames
-from volery.server.read_only import READ_ONLY_SERVICES
+
+READ_ONLY_SERVICES = frozenset(read_table(__file__, "read_only_services.toml")["services"])
+"""Services that change nothing: viewers may call them, and they command no UAV."""
+
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations without effect on other clients."""

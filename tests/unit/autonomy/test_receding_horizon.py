@@ -12,7 +12,7 @@ from volery.autonomy.planning.clearance import clearance_of
 from volery.autonomy.planning.cost_to_go import CellCosts, cost_to_go
 from volery.autonomy.planning.distances import squared_distances
 from volery.autonomy.planning.local_grid import UNKNOWN, LocalGrid
-from volery.autonomy.planning.path_lookahead import PathLookahead
+from volery.autonomy.planning.local_planner import PathLookahead
 from volery.autonomy.planning.primitive_selection import judge
 from volery.autonomy.planning.primitives import (
     MotionLimits,

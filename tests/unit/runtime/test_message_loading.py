@@ -6,7 +6,7 @@ import pytest
 
 from volery.core.errors import ScenarioError
 from volery.graph.messages import message_type
-from volery.runtime.construction.message_loading import learn_messages
+from volery.runtime.construction.start_check import learn_messages
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.load import load_scenario
 

@@ -4,9 +4,8 @@ import pytest
 
 from volery.core.errors import BridgeError
 from volery.runtime.vehicles.control_authority import ControlAuthority
-from volery.server.access_policy import OperatorPolicy, ViewerPolicy
+from volery.server.access_policy import READ_ONLY_SERVICES, OperatorPolicy, ViewerPolicy
 from volery.server.operator_names import OperatorNames
-from volery.server.read_only import READ_ONLY_SERVICES
 
 
 def call(service, **args):

@@ -17,8 +17,8 @@ from volery.core.errors import BridgeError
 from volery.graph.codecs.zero import zero_message
 from volery.runtime.idle_server import IdleServer
 from volery.server import page
+from volery.server.access_policy import READ_ONLY_SERVICES
 from volery.server.page_server import PageServer
-from volery.server.read_only import READ_ONLY_SERVICES
 from volery.server.settings import PageSettings
 
 

@@ -13,7 +13,6 @@ from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.neighbours import Neighbours
-from volery.autonomy.planning.path_lookahead import PathLookahead
 from volery.autonomy.planning.primitives import MotionLimits, PrimitivePath, PrimitiveState
 from volery.autonomy.planning.receding_horizon import (
     Observations,
@@ -40,6 +39,43 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.graph.nodes.node import Node
+
+
+class PathLookahead:
+    """Tracks progress along positions (K, 3) m, K > 0; progress never decreases."""
+
+    def __init__(self, places: Array, passed_m: float = 0.0) -> None:
+        self.places = places
+        lengths = np.linalg.norm(np.diff(places[:, :2], axis=0), axis=1)
+        self._along = np.concatenate([[0.0], np.cumsum(lengths)])
+        self.passed_m = min(passed_m, float(self._along[-1]))
+        """Progress along the path, m."""
+
+    @property
+    def goal(self) -> Array:
+        """Returns the end of the path, (3,) m."""
+        return np.asarray(self.places[-1])
+
+    def left_m(self, place: Array) -> float:
+        """Returns the distance (m) along the path to its end, from a position beside it."""
+        return float(
+            self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - place[:2]))
+        )
+
+    def lookahead_point(self, place: Array, ahead_m: float, search_m: float = 15.0) -> Array:
+        """Updates the progress and returns the point (2,) m `ahead_m` further along the path.
+
+        Progress becomes the point nearest to `place` within the next `search_m`.
+        """
+        steps = np.arange(self.passed_m, min(self.passed_m + search_m, self._along[-1]) + 0.25, 0.5)
+        away = np.hypot(*(self._at(steps) - place[:2, None]))
+        self.passed_m = float(min(steps[int(np.argmin(away))], self._along[-1]))
+        return self._at(min(self.passed_m + ahead_m, self._along[-1]))
+
+    def _at(self, along: float | Array) -> Array:
+        """Returns the point (2, ...) at a distance along the path."""
+        return np.array([np.interp(along, self._along, self.places[:, axis]) for axis in range(2)])
+
 
 _LOOKAHEAD_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""

@@ -11,15 +11,15 @@ from volery.autonomy.perception.motion_history import NodHistory
 from volery.autonomy.perception.scan_rays import has_return, is_usable, scan_times
 from volery.autonomy.slam import messages
 from volery.autonomy.slam.health import SlamHealth
-from volery.autonomy.slam.inertial_kernels import BG, G, V
+from volery.autonomy.slam.inertial_kernels import BG, G, Q, V
 from volery.autonomy.slam.keyframe_graph import KeyframeGraph
 from volery.autonomy.slam.keyframes import levelling
-from volery.autonomy.slam.level_odometry import LevelOdometry
 from volery.autonomy.slam.settings import ImuNoise, ScanMatching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
@@ -34,6 +34,32 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
+
+
+class LevelOdometry(SavedAttributes):
+    """Integrates the tracker's motion; each step is levelled by the current estimate of gravity.
+
+    So the odometry neither jumps nor tilts as the estimate improves: users combine it with an IMU
+    and assume that gravity points straight down.
+    """
+
+    STATE = ("_was", "position")
+
+    def __init__(self) -> None:
+        self._was: Array | None = None
+        self.position = np.zeros(3)
+        """(3,) m, position of the vehicle in the level frame."""
+
+    def follow(self, state: Array) -> tuple[Array, Array]:
+        """Returns position (3,) and attitude (4,) in the level frame, for a tracker state (19,)."""
+        turn = levelling(state[G : G + 3])
+        if self._was is None:
+            self.position = state[:3].copy()
+        else:
+            self.position = self.position + rotations.rotate(turn, state[:3] - self._was)
+        self._was = state[:3].copy()
+        return self.position, rotations.multiply(turn, state[Q : Q + 4])
+
 
 _JUMP_NS = NS_PER_S // 2
 """Step back in stamps from which the clock has been set back."""

@@ -18,7 +18,6 @@ from functools import partial
 
 from volery.bridges.loop_waker import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
 from volery.bridges.ros_tcp.connection import RosTcpConnection
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.ros_tcp.wire import Generation, RosTcpFrameParser
@@ -26,6 +25,16 @@ from volery.core.errors import BridgeError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
+
+KEEPALIVE_S = 1.0
+"""Seconds without a frame after which Unity's Connector sends a keepalive."""
+FIRST_PAUSE_S = 0.2
+LONGEST_PAUSE_S = 5.0
+"""Largest pause between two attempts; pauses double up to it."""
+_CONNECT_S = 5.0
+_UNANSWERED_MS = 15_000
+"""Time for which sent bytes may stay unacknowledged before the endpoint counts as gone, ms."""
+
 
 _REFRESH_S = 0.5
 _NOTES = 100
@@ -228,3 +237,20 @@ class _Connection:
         self.session.close()
         if not self.ended.done():
             self.ended.set_result(reason)
+
+
+async def dial(host: str, port: int) -> socket.socket:
+    """Returns a connected socket. Raises `OSError` or `TimeoutError` if no server answers."""
+    loop = asyncio.get_running_loop()
+    (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    sock = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        async with asyncio.timeout(_CONNECT_S):  # unlike wait_for it never loses a cancellation
+            await loop.sock_connect(sock, address)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
+    except BaseException:
+        sock.close()
+        raise
+    return sock

@@ -14,9 +14,10 @@ the same bytes. Rules and guarantees: docs/comms.md.
 
 from __future__ import annotations
 
-from volery.comms.addresses import SERVER
+from volery.comms.addresses import SERVER, Identity
 from volery.comms.control_payloads import (
     MOST_SEQUENCES,
+    Hello,
     Reason,
     Refusal,
     Welcome,
@@ -27,13 +28,14 @@ from volery.comms.control_payloads import (
 )
 from volery.comms.link_model import Link, ideal_link
 from volery.comms.protocol import MESSAGES, StationFrame, StationFrameKind, encode_frame
-from volery.comms.server.admission import admit
 from volery.comms.server.dispatcher import Dispatcher
 from volery.comms.server.records import StationConnection, StationRecord
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
+from volery.core.network_access import shows_token
+from volery.core.plurals import counted
 
 
 class Router:
@@ -273,3 +275,21 @@ class Router:
         )
         connection.closing = True
         self._woken.add(number)
+
+
+def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None:
+    """Returns None for a station that may join; else the refusal."""
+    if not shows_token(hello.token, settings.token):
+        return Refusal(Reason.TOKEN, 0, "the token is wrong, or there is none")
+    planes = settings.group_size
+    if hello.group_size != planes:
+        text = f"here a batch has {counted(planes, 'plane')}, not {hello.group_size}"
+        return Refusal(Reason.BATCH_SIZE, 0, text)
+    try:
+        address = Identity(hello.batch, hello.plane).address(planes)
+    except CommsError as error:
+        return Refusal(Reason.IDENTITY, 0, str(error))
+    if address != source:
+        text = f"batch {hello.batch}, plane {hello.plane} is station {address}, not {source}"
+        return Refusal(Reason.IDENTITY, 0, text)
+    return None

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from volery.core.errors import DataFileError
+from volery.core.errors import DataFileError, GraphError, ScenarioError
+from volery.graph.messages import add_definitions
 from volery.runtime.construction.fleet import check_types
-from volery.runtime.construction.message_loading import learn_messages
 from volery.runtime.construction.node_loading import check_nodes
 from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
@@ -48,3 +48,19 @@ def _files(part: Any, key: str) -> Iterator[tuple[str, str]]:
     elif isinstance(part, tuple | list):
         for value in part:
             yield from _files(value, key)
+
+
+def learn_messages(scenario: Scenario) -> list[str]:
+    """Registers the types of the scenario's message folders and returns their names.
+
+    Folders are searched beside the scenario and in the working folder. Raises `ScenarioError`
+    with the key and, for an invalid definition, its file and line.
+    """
+    learned = []
+    for k, name in enumerate(scenario.message_packages):
+        where = f"{scenario.name}: message_packages[{k}]"
+        try:
+            learned += add_definitions(scenario.access.find_folder(name))
+        except (DataFileError, GraphError) as error:
+            raise ScenarioError(f"{where}: {error}") from None
+    return learned

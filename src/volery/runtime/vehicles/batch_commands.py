@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +21,39 @@ from volery.core.errors import CommandError
 from volery.core.uncopied import Uncopied
 from volery.runtime.checks import check_timeout
 from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
-from volery.runtime.vehicles.flight_future_list import FlightFutureList
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
 from volery.vehicle.fleet import FleetState
+
+
+class FlightFutureList(list[FlightFuture]):
+    """Futures of one command to several UAVs: `vehicles.take_off().wait()`, or `await` it.
+
+    now_s: returns the simulated time, s.
+    """
+
+    def __init__(self, futures: Iterable[FlightFuture], now_s: Callable[[], float]) -> None:
+        super().__init__(futures)
+        self._now_s = now_s
+
+    def wait(self, timeout_s: float = 60.0) -> list[CommandResult]:
+        """Waits for all of them, `timeout_s` of simulated time, s, together.
+
+        Returns their results. See `FlightFuture.wait`.
+        """
+        end_s = self._now_s() + timeout_s
+        for future in self:
+            if not future.wait_until_done(max(0.0, end_s - self._now_s())):
+                raise future.timeout_error(timeout_s)
+        return [future.result() for future in self]
+
+    def __await__(self) -> Generator[Any, None, list[CommandResult]]:
+        """Waits for all of them while other coroutines run; see `FlightFuture`."""
+        results = []
+        for future in self:
+            results.append((yield from future.__await__()))
+        return results
+
 
 _DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _NOT_GUIDED = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
