@@ -31,7 +31,7 @@ _SPEEDS = 0.25, 0.75
 _STARTS, _QUICK_STARTS = 1000, 20
 _FLIGHTS, _QUICK_FLIGHTS = 100, 2
 _GAMES, _QUICK_GAMES = 100, 2
-_RUNS = {"orca": 100, "vasarhelyi": 10, "olfati_saber": 10}
+_RUNS = {"orca": 100, "trajectories": 100, "vasarhelyi": 10, "olfati_saber": 10}
 """Runs of each situation; rules of flocks, beside which ORCA flies, mostly use the whole time."""
 
 

@@ -36,10 +36,11 @@ def test_a_crowd_has_four_figures_for_each_behaviour(flown: list[Any]) -> None:
     figures = find("swarm").run(only=("circle_swap",)).figures
     assert flown == [
         ("circle_swap", "orca", 100),
+        ("circle_swap", "trajectories", 100),
         ("circle_swap", "vasarhelyi", 10),
         ("circle_swap", "olfati_saber", 10),
     ]
-    assert len(figures) == 12
+    assert len(figures) == 16
     of_orca = {name[17:]: figure for name, figure in figures.items() if "_orca_" in name}
     assert of_orca == {
         "collisions": 2.0,  # runs with one, not UAVs
@@ -52,9 +53,9 @@ def test_a_crowd_has_four_figures_for_each_behaviour(flown: list[Any]) -> None:
 def test_quick_flies_each_crowd_once_and_plays_two_games(flown: list[Any]) -> None:
     only = ("crossing_streams", "games", "forest_passage")
     figures = find("swarm").run(quick=True, only=only).figures
-    assert [runs for _, _, runs in flown] == [1] * 6
+    assert [runs for _, _, runs in flown] == [1] * 8
     assert figures["games_won"] == 2.0
-    assert len(figures) == 25
+    assert len(figures) == 33
 
 
 def test_parts_that_do_not_exist_are_refused(flown: list[Any]) -> None:

@@ -19,10 +19,11 @@ from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.team_link import TeamLink, number
 from volery.autonomy.swarm.team_scans import TeamScans
+from volery.autonomy.swarm.trajectories import Trajectories
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 from volery.core.arrays import Array
 from volery.core.errors import PlanError
-from volery.core.saved_state import SavedAttributes
+from volery.core.saved_state import SavedAttributes, Stateful
 from volery.graph.messages import String
 from volery.graph.nodes.node import Node
 
@@ -63,6 +64,7 @@ class FlockNode(SavedAttributes, Node):
         "vasarhelyi": Vasarhelyi,
         "olfati_saber": OlfatiSaber,
         "orca": Orca,
+        "trajectories": Trajectories,
     }
     """Implementations of `SwarmBehaviour` by the names of the parameter `behaviour`."""
 
@@ -106,6 +108,17 @@ class FlockNode(SavedAttributes, Node):
         self._scans = TeamScans(self, self._team, scan)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
         self.create_timer(_PERIOD_S, self._on_timer)
+
+    def get_state(self) -> dict[str, Any]:
+        """Returns the state for a snapshot, with that of a behaviour that has one."""
+        kept = self._behaviour.get_state() if isinstance(self._behaviour, Stateful) else None
+        return {**super().get_state(), "behaviour": kept}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Restores what `get_state` returned."""
+        super().set_state(state)
+        if isinstance(self._behaviour, Stateful):
+            self._behaviour.set_state(state["behaviour"])
 
     def _named_behaviour(self) -> SwarmBehaviour:
         known = self.BEHAVIOURS

@@ -15,6 +15,7 @@ from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
 from volery.autonomy.swarm.team_scans import find_nearest
+from volery.autonomy.swarm.trajectories import Trajectories
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 
 
@@ -36,6 +37,6 @@ def flocking() -> None:
     ScanProjector([0.0, 0.0, 0.0]).points(a_scan(), a_pose(0))
     find_nearest(np.ones((1, 2)), position, 0, np.full((4, 2), np.nan))
     around = Surroundings(cylinders=np.array([[5.0, 5.0, 0.3]]))
-    for behaviour in (Vasarhelyi(), OlfatiSaber(), Orca()):
+    for behaviour in (Vasarhelyi(), OlfatiSaber(), Orca(), Trajectories()):
         flock = flock_within(position, velocity, behaviour.radius_m)
         behaviour.velocities(flock, velocity, around)

@@ -11,7 +11,7 @@ from swarm_team import SwarmTeam
 from volery.autonomy.swarm.flock import FlockNode
 from volery.core.errors import PlanError, VoleryError
 
-BEHAVIOURS = ("vasarhelyi", "olfati_saber", "orca")
+BEHAVIOURS = ("vasarhelyi", "olfati_saber", "orca", "trajectories")
 GRID = [[5.0 * x, 5.0 * y, 5.0] for x in range(3) for y in range(3)]
 
 

@@ -6,9 +6,10 @@ import pytest
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
+from volery.autonomy.swarm.trajectories import Trajectories
 from volery.autonomy.swarm.vasarhelyi import Vasarhelyi
 
-BEHAVIOURS = (Vasarhelyi, OlfatiSaber, Orca)
+BEHAVIOURS = (Vasarhelyi, OlfatiSaber, Orca, Trajectories)
 PERIOD_S, LAG_S, SPEED_M_S = 0.05, 0.3, 3.0
 AHEAD = np.array([100.0, 0.0])
 

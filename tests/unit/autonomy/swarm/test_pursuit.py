@@ -37,7 +37,7 @@ def last(statuses):
     return json.loads(statuses[-1].data)
 
 
-@pytest.mark.parametrize("behaviour", ["vasarhelyi", "olfati_saber", "orca"])
+@pytest.mark.parametrize("behaviour", ["vasarhelyi", "olfati_saber", "orca", "trajectories"])
 def test_a_flock_that_flees_is_not_captured_and_one_that_does_not_is(behaviour):
     careless, statuses = hunted_flock(behaviour=behaviour, uavs=TEAM)
     careless.fly(40.0)
