@@ -210,6 +210,8 @@ class CommandLineFlight:
                 while not simulation.clock.quitting:
                     simulation.wait_at_end(self._look_at_end)
                     simulation.run(speed=simulation.clock.speed, on_progress=self._on_progress)
+                    if not simulation.clock.quitting:
+                        self._checks.judge()
         except _StoppedError:
             return
 

@@ -51,8 +51,11 @@ class FlightChecks:
         if self._live is not None:
             self._live.look()
 
-    def judge(self, wall_s: float) -> tuple[Verdict, ...]:
-        """Ends the recording and returns the verdicts; wall_s: wall time of the flight, s."""
+    def judge(self, wall_s: float | None = None) -> tuple[Verdict, ...]:
+        """Ends the recording, publishes the verdicts and returns them.
+
+        wall_s: wall time of the flight, s; None: that since its start or last reset.
+        """
         if self._live is not None:
             self._verdicts = self._live.finish(wall_s)
         return self._verdicts
