@@ -11,10 +11,9 @@ import threading
 import numpy as np
 import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
-from volery.bridges.ros_tcp.connectoror import RosTcpConnector
 
 from volery.bridges.bridge_host import BridgeHost
-from volery.bridges.ros_tcp.connector import dial
+from volery.bridges.ros_tcp.connector import RosTcpConnector, dial
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError
 from volery.graph.messages import String, Twist, Vector3, message_type
@@ -217,7 +216,7 @@ def test_connections_are_reported(here, there, port):
 
 
 def test_opening_waits_for_an_endpoint_that_is_there(here, there, monkeypatch):
-    monkeypatch.setattr("volery.bridges.ros_tcp.connectoror._FIRST_ATTEMPT_S", 60.0)
+    monkeypatch.setattr("volery.bridges.ros_tcp.connector._FIRST_ATTEMPT_S", 60.0)
     endpoint = RosTcpEndpoint(port=0)
     there.bridges.open(endpoint)
     connector = RosTcpConnector(port=endpoint.port, **PATIENT)
