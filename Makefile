@@ -73,7 +73,7 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 	$(BIN)/ruff format --check src benchmarks tests examples tools
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	@! find tests -name 'test_*.py' -printf '%f: the name of two test files\n' | sort | uniq -d | grep .
+	@! find tests -name 'test_*.py' | sed 's,.*/,two test files are called ,' | sort | uniq -d | grep .
 	@if .ci/node_fits; then $(MAKE) --no-print-directory web/node_modules/.package-lock.json \
 		&& cd web && npm run --silent check; fi
 
