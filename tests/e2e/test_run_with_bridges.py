@@ -193,7 +193,7 @@ def test_slips_are_told_in_a_line(run, words, reason):
     assert reason in volery(run, *words, ok=False)
 
 
-@pytest.mark.parametrize("way", [via_rosbridge, via_ros2])
+@pytest.mark.parametrize("way", [via_rosbridge])
 def test_a_node_runs_beside(run, tmp_path, way):
     name = way.__name__
     (tmp_path / "echoing.py").write_text(
