@@ -6,6 +6,9 @@ its distance from obstacles and from the committed trajectories of its neighbour
 Where it finds none, it flies on along its old one, from which later plans of others keep away. So
 committed trajectories never cross, as in MADER (J. Tordesillas, J. How, IEEE T-RO 2022) and
 EGO-Swarm (X. Zhou et al., ICRA 2021), which optimize splines instead of choosing among samples.
+
+UAVs that have arrived would block those behind; as with ORCA, a UAV prefers to be out of the way of
+neighbours that prefer to fly faster.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from volery.autonomy.swarm.behaviour import Flock, Surroundings
+from volery.autonomy.swarm.velocity_choice import give_way
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.saved_state import SavedAttributes
@@ -51,6 +55,8 @@ class TrajectorySettings(NamedTuple):
     """Velocity per distance from the trajectory, 1/s."""
     lost_m: float = 1.5
     """Distance from its trajectory at which a UAV gets a new one, from where it is."""
+    way_s: float = 1.0
+    """Time ahead in which a UAV is out of the way of those that prefer to fly faster."""
     max_speed_m_s: float = 5.0
 
 
@@ -119,7 +125,7 @@ def _plan_all(
     wanted: Any,
 ) -> None:
     """Renews committed trajectories and fills the velocities (N, 2) along them."""
-    count = len(position)
+    count, most = len(position), 0
     trial = np.empty((2, 6))
     for i in range(count):
         x, y = _at(committed.curves[i], now_s - committed.start_s[i], settings.duration_s, 0)
@@ -130,11 +136,17 @@ def _plan_all(
                 start = position[i, axis]
                 _fill(committed.curves[i], axis, start, speed, 0.0, end, settings.duration_s)
             committed.start_s[i], committed.turn[i] = now_s, 0.0
+        most = max(most, first[i + 1] - first[i])
+    planes, relaxed = np.empty((most, 3)), np.empty((most, 3))
     for i in range(count):
         if (calls + i) % settings.calls == 0:
             near = neighbour[first[i] : first[i + 1]]
+            _, vx, vy = give_way(
+                position, preferred, i, near, settings.distance_m, settings.way_s,
+                settings.way_s, settings.max_speed_m_s, planes, relaxed,
+            )  # fmt: skip
             _plan(
-                i, position, near, preferred, arena, cylinders, echoes, settings, committed, now_s,
+                i, vx, vy, position, near, arena, cylinders, echoes, settings, committed, now_s,
                 trial,
             )  # fmt: skip
     for i in range(count):
@@ -148,9 +160,10 @@ def _plan_all(
 @inner_kernel
 def _plan(
     i: int,
+    preferred_x: float,
+    preferred_y: float,
     position: Any,
     near: Any,
-    preferred: Any,
     arena: Any,
     cylinders: Any,
     echoes: Any,
@@ -164,8 +177,8 @@ def _plan(
     x, y = _at(committed.curves[i], since_s, duration, 0)
     vx, vy = _at(committed.curves[i], since_s, duration, 1)
     ax, ay = _at(committed.curves[i], since_s, duration, 2)
-    speed = min(math.hypot(preferred[i, 0], preferred[i, 1]), settings.max_speed_m_s)
-    heading = math.atan2(preferred[i, 1], preferred[i, 0])
+    speed = min(math.hypot(preferred_x, preferred_y), settings.max_speed_m_s)
+    heading = math.atan2(preferred_y, preferred_x)
     length = _LENGTH * duration * speed
     best, best_turn, best_part = math.inf, 0.0, -1.0
     for turn in _TURNS:

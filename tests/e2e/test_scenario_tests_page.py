@@ -1,0 +1,82 @@
+"""The document on scenario tests: its workflow runs step by step, as in a runner."""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+PAGE = (Path(__file__).parents[2] / "docs" / "scenario_tests.md").read_text("utf-8")
+PASSES = "always(speed < 3)"
+
+
+def block(language, first_line):
+    """Returns the block of code that starts with a comment."""
+    (found,) = re.findall(rf"^```{language}\n# {first_line}\n(.*?)^```", PAGE, re.DOTALL | re.M)
+    return found
+
+
+@pytest.fixture
+def steps():
+    """Returns the steps of the workflow's only job."""
+    workflow = YAML(typ="safe").load(block("yaml", r"\.github/workflows/flights\.yml"))
+    (job,) = workflow["jobs"].values()
+    return job["steps"]
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Returns a repository that holds the document's scenario."""
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    scenario = block("toml", r"hop\.toml")
+    assert PASSES in scenario
+    (folder / "hop.toml").write_text(scenario, encoding="utf-8")
+    return tmp_path
+
+
+def run(steps, checkout):
+    """Runs the commands as a runner does, up to the first that fails; returns its exit code."""
+    install, *commands = [step["run"] for step in steps if "run" in step]
+    assert install == "pip install volery"  # test_wheel.py installs it
+    path = f"{Path(sys.executable).parent}:/usr/bin:/bin"
+    for command in commands:
+        done = subprocess.run(
+            ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", command],
+            check=False,
+            cwd=checkout,
+            env={"PATH": path, "HOME": str(checkout), "CI": "true", "GITHUB_ACTIONS": "true"},
+            capture_output=True,
+            text=True,
+            timeout=900.0,
+        )
+        if done.returncode:
+            return done.returncode
+    return 0
+
+
+def test_flights_that_pass(steps, checkout):
+    assert run(steps, checkout) == 0
+    suite = ET.parse(checkout / "results.xml").getroot()
+    cases = list(suite.iter("testcase"))
+    assert len(cases) == 20
+    assert not list(suite.iter("failure"))
+
+
+def test_flights_that_fail_leave_what_is_uploaded(steps, checkout):
+    file = checkout / "scenarios" / "hop.toml"
+    file.write_text(
+        file.read_text("utf-8").replace(PASSES, "always(speed < 0.5)"), encoding="utf-8"
+    )
+    assert run(steps, checkout) == 1
+    upload = steps[-1]
+    assert upload["if"] == "failure()"
+    kinds = set()
+    for pattern in upload["with"]["path"].splitlines():
+        files = [path for path in checkout.glob(pattern) if path.is_file()]
+        assert files, pattern
+        kinds |= {path.suffix for path in files}
+    assert {".xml", ".mcap", ".png"} <= kinds
