@@ -37,7 +37,7 @@ timeout_s = 60.0
 [points]
 arrives = 3
 """
-PILOT = """
+CONTROLLER = """
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -71,7 +71,7 @@ def write_assignment(folder, text=ASSIGNMENT, scenario=SCENARIO):
     return file
 
 
-def write_pilot(file, method=""):
+def write_controller(file, method=""):
     """Writes a submission, with a method in place of the one of this name."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(PILOT + textwrap.indent(textwrap.dedent(method), "    "), encoding="utf-8")
+    file.write_text(CONTROLLER + textwrap.indent(textwrap.dedent(method), "    "), encoding="utf-8")

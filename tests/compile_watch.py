@@ -35,7 +35,7 @@ class NeedsWatch:
     """`needed`: each kernel that is compiled or loaded from the cache, from now on.
 
     What a first start compiles in flight, a later one loads in flight: so a full cache serves to
-    tell what an empty one lacks.
+    reveal what an empty one lacks.
     """
 
     def __init__(self) -> None:

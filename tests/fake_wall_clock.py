@@ -10,8 +10,8 @@ class FakeWallClock:
     def __init__(self):
         self.now_s = 100.0
         self.time = SimpleNamespace(perf_counter=lambda: self.now_s, thread_time=time.thread_time)
-        """In the place of the module `time`."""
+        """Replaces the module `time`."""
 
     def wait(self, timeout_s):
-        """In the place of a condition's or an event's `wait`: nothing ends it early."""
+        """Replaces a condition's or an event's `wait`: nothing ends it early."""
         self.now_s += timeout_s

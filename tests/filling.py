@@ -44,8 +44,8 @@ def _scalar(base: str, limit: int, rng: np.random.Generator) -> Any:
         return bool(rng.integers(0, 2))
     if base.startswith("float"):
         return float(np.dtype(base).type(rng.normal()))
-    least, greatest = INTEGER_RANGES["int8" if base == "byte" else base]
-    return int(rng.integers(least, greatest, endpoint=True, dtype=DTYPES[base]))
+    minimum, maximum = INTEGER_RANGES["int8" if base == "byte" else base]
+    return int(rng.integers(minimum, maximum, endpoint=True, dtype=DTYPES[base]))
 
 
 def assert_same(

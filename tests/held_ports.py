@@ -1,4 +1,4 @@
-"""Port numbers that stay a test's own while nobody listens there yet, or any more."""
+"""Port numbers that stay a test's own while no server listens there yet, or any more."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import socket
 def held_port():
     """A TCP port of 127.0.0.1 that refuses connections until a server is started there by number.
 
-    The system gives it to nobody else, also not to another test process: a socket that does not
+    The system gives it to no other process, no test process either: a socket that does not
     listen keeps it. A server with SO_REUSEADDR, as servers set it, can listen there all the same.
     """
-    with socket.socket() as keeper:
-        keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        keeper.bind(("127.0.0.1", 0))
-        yield keeper.getsockname()[1]
+    with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(("127.0.0.1", 0))
+        yield sock.getsockname()[1]

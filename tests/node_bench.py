@@ -32,7 +32,7 @@ class NodeBench:
         self.now_ns = 0
         self.graph = Graph(lambda: self.now_ns)
         self.context = Context(self.graph, self, lambda: self.now_ns)
-        self.heard = {}
+        self.received = {}
         self._timers = []
         self._order = itertools.count()
 
@@ -49,9 +49,9 @@ class NodeBench:
         return node_class(context=self.context, namespace="/uav1", parameter_overrides=parameters)
 
     def listen(self, topic):
-        self.heard[topic] = []
-        self.graph.subscribe(topic, lambda p: self.heard[topic].append(p.message))
-        return self.heard[topic]
+        self.received[topic] = []
+        self.graph.subscribe(topic, lambda p: self.received[topic].append(p.message))
+        return self.received[topic]
 
     def send(self, topic, message):
         """Publish it; its arrays become read-only, as those of the simulation are."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from ros2_bench import DOMAIN
 
 _PROGRAM = Path(__file__).parent / "conformance" / "bridges" / "plain_ros2.py"
-_PATIENCE_S = 600.0
+_TIMEOUT_S = 600.0
 _START_S = 600.0
 """On a machine that is busy with other things."""
 _SHORT_S, _LONG_S = 4.0, 120.0
@@ -24,11 +24,11 @@ _idle = {_SHORT_S: [], _LONG_S: []}
 
 
 class PlainPeer:
-    """One of them; `hear` gets what it tells of each message."""
+    """One of them; `on_message` gets its report of each message."""
 
     def __init__(self, lease_s):
         self.lease_s = lease_s
-        self.hear = None
+        self.on_message = None
         self._ended = False
         self._done = queue.Queue()
         self._process = subprocess.Popen(
@@ -48,18 +48,18 @@ class PlainPeer:
     def _read(self):
         for line in self._process.stdout:
             if not line.endswith("\n"):
-                break  # killed while it told
-            told = json.loads(line)
-            if "heard" not in told:
-                self._done.put(told.get("done"))
-            elif self.hear is not None:
-                self.hear(told)
+                break  # killed while it wrote
+            report = json.loads(line)
+            if "topic" not in report:
+                self._done.put(report.get("done"))
+            elif self.on_message is not None:
+                self.on_message(report)
 
     def do(self, op, **fields):
-        """Have something done; what came of it."""
+        """Run an operation; its result."""
         self._process.stdin.write(json.dumps({"op": op, **fields}) + "\n")
         self._process.stdin.flush()
-        return self._done.get(timeout=_PATIENCE_S)
+        return self._done.get(timeout=_TIMEOUT_S)
 
     def stop(self):
         """Have it stand still."""
@@ -71,7 +71,7 @@ class PlainPeer:
 
     def give_back(self):
         """Let others have it, if it lives."""
-        self.hear = None
+        self.on_message = None
         if self._ended or self in _idle[self.lease_s]:
             return
         self.go_on()
@@ -83,24 +83,24 @@ class PlainPeer:
         _idle[self.lease_s].append(self)
 
     def kill(self):
-        """End it without farewell."""
+        """Kill the process."""
         self._ended = True
         self._process.kill()
         self._process.wait()
         self._reader.join()
-        with contextlib.suppress(BrokenPipeError):  # of an order that it never read
+        with contextlib.suppress(BrokenPipeError):  # of a command that it never read
             self._process.stdin.close()
         self._process.stdout.close()
 
 
-def take_peer(hear=None, *, patient=False):
+def take_peer(on_message=None, *, patient=False):
     """A peer that takes part in nothing yet.
 
     patient: others take it for gone after two minutes of silence, in place of four seconds.
     """
     idle = _idle[_LONG_S if patient else _SHORT_S]
     peer = idle.pop() if idle else PlainPeer(_LONG_S if patient else _SHORT_S)
-    peer.hear = hear
+    peer.on_message = on_message
     return peer
 
 

@@ -67,7 +67,7 @@ class FlatScene:
 
 
 class PlainScene(Scene):
-    """A scene that asks embreex's public call."""
+    """A scene that uses embreex's public call."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -118,7 +118,7 @@ class PlainBackend:
         self._flatten(content)
 
     def replace_solids(self, content: SceneContent, first: int) -> None:
-        """Go on with `content`; everything is flattened anew."""
+        """Replace the content by `content`; everything is flattened again."""
         self._flatten(content)
 
     def _flatten(self, content: SceneContent) -> None:
@@ -185,8 +185,8 @@ class PlainBackend:
         part = np.where(blocks[:, 0] > self._content.trees, _looks_up(n), blocks[:, 1])
         material[hit] = handle.material[blocks[:, 0], part]
         ground = np.flatnonzero(hit)[blocks[:, 0] == 0]
-        places = origins[ground] + distance[ground, None] * directions[ground]
-        material[ground] = [ground_material(handle.cover, x, y) for x, y, _ in places]
+        points = origins[ground] + distance[ground, None] * directions[ground]
+        material[ground] = [ground_material(handle.cover, x, y) for x, y, _ in points]
         bodies = handle.bodies
         uavs = len(bodies.scene) - bodies.actors
         for row in range(len(bodies.scene)):
@@ -246,11 +246,11 @@ class PlainBackend:
         distance, nearest, instance = out
         distance[:], nearest[:], instance[:] = reach, points, -1
         for i, point in enumerate(points):
-            places = nearest_on_triangles(point, corners)
-            away = np.linalg.norm(places - point, axis=1)
+            points = nearest_on_triangles(point, corners)
+            away = np.linalg.norm(points - point, axis=1)
             k = int(away.argmin()) if len(away) else -1
             if k >= 0 and away[k] < reach:
-                distance[i], nearest[i], instance[i] = away[k], places[k], owner[k]
+                distance[i], nearest[i], instance[i] = away[k], points[k], owner[k]
 
     def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
         """Fill `out` with the closed solid that each point lies in, -1 for none."""
@@ -268,7 +268,7 @@ class PlainBackend:
 def nearest_on_triangles(
     point: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(T, 3) m, the nearest place of each triangle (T, 3, 3) to a point (3,)."""
+    """(T, 3) m, the nearest point of each triangle (T, 3, 3) to a point (3,)."""
     edges = np.roll(corners, -1, axis=1) - corners
     to_point = point - corners
     squared = np.einsum("tij,tij->ti", edges, edges)

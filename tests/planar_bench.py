@@ -44,7 +44,7 @@ def storey():
 
 
 def corridor(length=60.0):
-    """A plain one with some things in its first metres, and a bridge near its end."""
+    """A plain one with some objects in its first metres, and a bridge near its end."""
     walls = box(-4.0, -1.0, length, 1.0)
     walls += box(-3.0, -1.0, -2.4, -0.5) + box(1.0, 0.6, 1.7, 1.0) + box(4.0, -1.0, 4.5, -0.7)
     walls += box(length - 10.0, 0.5, length - 9.3, 1.0)
@@ -73,12 +73,12 @@ def along(corners, speed=1.0, rate_hz=5.0, ease_m=1.2, start_s=1.0):
     smooth = np.stack([np.convolve(padded[:, k], kernel, "valid") for k in range(2)], 1)
     ahead = np.gradient(smooth, axis=0)
     yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
-    way = np.concatenate([[0.0], np.hypot(*np.diff(smooth, axis=0).T).cumsum()])
-    time_s = np.arange(0.0, start_s + way[-1] / speed + 1.0, 1.0 / rate_hz)
+    arc_length = np.concatenate([[0.0], np.hypot(*np.diff(smooth, axis=0).T).cumsum()])
+    time_s = np.arange(0.0, start_s + arc_length[-1] / speed + 1.0, 1.0 / rate_hz)
     gone = np.maximum(time_s - start_s, 0.0)
     gone = speed * np.where(gone < 1.0, 0.5 * gone**2, gone - 0.5)
-    gone = np.minimum(gone, way[-1])
-    poses = [np.interp(gone, way, column) for column in (*smooth.T, yaw)]
+    gone = np.minimum(gone, arc_length[-1])
+    poses = [np.interp(gone, arc_length, column) for column in (*smooth.T, yaw)]
     return time_s, np.stack(poses, 1)
 
 
@@ -90,23 +90,23 @@ def cast(walls, pose, angles):
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = c[:, None] * dy - s[:, None] * dx
         away = (ax * dy - ay * dx) / cross
-        share = (ax * s[:, None] - ay * c[:, None]) / cross
-        met = (away > 1e-6) & (share >= 0.0) & (share <= 1.0)
+        along_wall = (ax * s[:, None] - ay * c[:, None]) / cross
+        met = (away > 1e-6) & (along_wall >= 0.0) & (along_wall <= 1.0)
     return np.where(met, away, np.inf).min(axis=1)
 
 
 class Carried:
-    """A scanner on its way: `time_s` (N,), `poses` (N, 3), `ranges` (N, B)."""
+    """A scanner along a path: `time_s` (N,), `poses` (N, 3), `ranges` (N, B)."""
 
-    def __init__(self, walls, corners, *, beams=361, fov_deg=270.0, reach=20.0, noise=0.015,
+    def __init__(self, walls, corners, *, beams=361, fov_deg=270.0, max_range_m=20.0, noise=0.015,
                  seed=1, speed=1.0, rate_hz=5.0):  # fmt: skip
         rng = np.random.default_rng(seed)
         self.angles = np.radians(np.linspace(-0.5 * fov_deg, 0.5 * fov_deg, beams))
-        self.reach, self.walls = reach, walls
+        self.max_range_m, self.walls = max_range_m, walls
         self.time_s, self.poses = along(corners, speed=speed, rate_hz=rate_hz)
         rows = [cast(walls, pose, self.angles) for pose in self.poses]
         self.ranges = np.array(rows) + rng.normal(0.0, noise, (len(rows), beams))
-        self.ranges[self.ranges > reach] = np.inf
+        self.ranges[self.ranges > max_range_m] = np.inf
         self.odometry = self._drifting(rng)
 
     def _drifting(self, rng):
@@ -129,7 +129,9 @@ class Carried:
 
     def scan(self, row):
         """The message."""
-        return scan_message(round(self.time_s[row] * S), self.ranges[row], self.angles, self.reach)
+        return scan_message(
+            round(self.time_s[row] * S), self.ranges[row], self.angles, self.max_range_m
+        )
 
     def odometry_message(self, row):
         return odometry_message(round(self.time_s[row] * S), self.odometry[row])
@@ -148,16 +150,17 @@ class Carried:
         moving = "[odometry]\ncolumns = [1, 2, 3]\nunit_deg = 0.001\n" if with_odometry else ""
         return (
             f"[ranges]\nfirst_column = {4 if with_odometry else 1}\nbeams = {len(self.angles)}\n"
-            f"angle_min_deg = {low}\nangle_max_deg = {high}\nrange_max_m = {self.reach}\n{moving}"
+            f"angle_min_deg = {low}\nangle_max_deg = {high}\nrange_max_m = {self.max_range_m}\n"
+            f"{moving}"
         )
 
 
-def scan_message(time_ns, ranges, angles, reach):
+def scan_message(time_ns, ranges, angles, max_range_m):
     message = zero_message("sensor_msgs/msg/LaserScan")
     message.header = m.header(time_ns, "uav1/laser_horizontal")
     message.angle_min, message.angle_max = float(angles[0]), float(angles[-1])
     message.angle_increment = float(angles[1] - angles[0])
-    message.range_min, message.range_max = 0.05, reach
+    message.range_min, message.range_max = 0.05, max_range_m
     message.ranges = np.asarray(ranges, np.float32)
     return message
 

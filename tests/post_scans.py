@@ -34,20 +34,20 @@ def slope(x: Any) -> Any:
     return 0.12 * x
 
 
-def seen_from(place: np.ndarray, nod: float) -> np.ndarray:
+def seen_from(position: np.ndarray, nod: float) -> np.ndarray:
     """Ranges (1081,) of a scanner there that looks along x, by `nod` down."""
     angle = math.radians(0.25) * np.arange(1081) - MIDDLE
     along = np.stack([np.cos(nod) * np.cos(angle), np.sin(angle), -np.sin(nod) * np.cos(angle)], 1)
     with np.errstate(divide="ignore"):
-        ground = (slope(place[0]) - place[2]) / (along[:, 2] - 0.12 * along[:, 0])
+        ground = (slope(position[0]) - position[2]) / (along[:, 2] - 0.12 * along[:, 0])
     ranges = np.where(ground > 0.0, ground, np.inf)
     level = np.hypot(along[:, 0], along[:, 1])
     for post in POSTS:
-        to = np.array([post.x, post.y]) - place[:2]
+        to = np.array([post.x, post.y]) - position[:2]
         near = (along[:, :2] @ to) / level
         aside = np.abs(along[:, 0] * to[1] - along[:, 1] * to[0]) / level
         at = (near - np.sqrt(np.maximum(post.radius**2 - aside**2, 0.0))) / level
-        z = place[2] + at * along[:, 2]
+        z = position[2] + at * along[:, 2]
         hit = (near > 0.0) & (aside < post.radius) & (post.low < z) & (z < post.high)
         ranges[hit] = np.minimum(ranges[hit], at[hit])
     ranges[ranges > 30.0] = np.inf

@@ -78,11 +78,11 @@ class Master:
             stderr=subprocess.DEVNULL,
         )
 
-        def answers():
+        def is_up():
             with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self._port)):
                 return True
 
-        assert wait_until(answers)
+        assert wait_until(is_up)
 
     def stop(self):
         if self._process is not None:
@@ -146,11 +146,11 @@ def running(*command):
         start_new_session=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
-    said = []
-    reader = threading.Thread(target=lambda: said.extend(process.stdout), daemon=True)
+    lines = []
+    reader = threading.Thread(target=lambda: lines.extend(process.stdout), daemon=True)
     reader.start()
     try:
-        yield said
+        yield lines
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)  # those it started, too
@@ -189,7 +189,7 @@ class Program:
             raise value
         return value
 
-    def tell(self, line):
+    def send_line(self, line):
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 

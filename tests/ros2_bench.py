@@ -26,17 +26,17 @@ def _own_domains():
     That is a TCP socket at the first one's first port: DDS uses ports of UDP alone.
     """
     for run in range(_RUNS):
-        first, place = 1 + _DOMAINS_EACH * run, socket.socket()
+        first, lock = 1 + _DOMAINS_EACH * run, socket.socket()
         try:
-            place.bind(("127.0.0.1", _BASE_PORT + _PORTS_A_DOMAIN * first))
+            lock.bind(("127.0.0.1", _BASE_PORT + _PORTS_A_DOMAIN * first))
         except OSError:
-            place.close()
+            lock.close()
         else:
-            return first, place
+            return first, lock
     return 1 + _DOMAINS_EACH * (os.getpid() % _RUNS), None  # shared with others, at worst
 
 
-DOMAIN, _PLACE = _own_domains()
+DOMAIN, _DOMAIN_LOCK = _own_domains()
 """This and the five after it are the test process's own: those beside it do not see into them."""
 
 
@@ -49,12 +49,12 @@ class Other:
         self.participant.add_node(self.node)
         self.participant.announce()
 
-    def hear(self, topic, msgtype, profile=None):
+    def subscribe(self, topic, msgtype, profile=None):
         """A queue that fills with messages."""
-        heard = queue.Queue()
+        received = queue.Queue()
         spec = TopicSpec(self.node, topic, msgtype, profile or Profile(depth=100))
-        self.participant.reader(spec, lambda data: heard.put(decode_cdr(data, msgtype)))
-        return heard
+        self.participant.reader(spec, lambda data: received.put(decode_cdr(data, msgtype)))
+        return received
 
     def speak(self, topic, msgtype, profile=None):
         """A function that publishes; the writer is matched."""

@@ -84,7 +84,7 @@ class Client:
         return fields["text"]
 
     def synchronize(self):
-        """Return when all that was sent has been worked off; drops the answers before it."""
+        """Return when all that was sent has been worked off; drops the responses before it."""
         self.command("topic_list")
         while self.next()[0] != "__topic_list":
             pass

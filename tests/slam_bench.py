@@ -20,9 +20,9 @@ STAND_S, CLIMB_S = 1.5, 3.0
 def trunks(count=90, half_m=30.0, seed=4, clear_m=2.0):
     """(K, 3): x, y and radius; none near the origin."""
     random = np.random.default_rng(seed)
-    places = random.uniform(-half_m, half_m, (4 * count, 2))
-    places = places[np.hypot(*places.T) > clear_m][:count]
-    return np.column_stack([places, random.uniform(0.04, 0.2, len(places))])
+    positions = random.uniform(-half_m, half_m, (4 * count, 2))
+    positions = positions[np.hypot(*positions.T) > clear_m][:count]
+    return np.column_stack([positions, random.uniform(0.04, 0.2, len(positions))])
 
 
 class Flight:
@@ -36,8 +36,8 @@ class Flight:
         up = np.clip((time_s - STAND_S) / CLIMB_S, 0.0, 1.0)
         z = 0.2 + 2.8 * (up * up * (3.0 - 2.0 * up))
         along = max(time_s - STAND_S - CLIMB_S, 0.0)
-        way = self.speed * (along - np.tanh(along))  # gathers speed within two seconds
-        turn = way / self.radius
+        distance = self.speed * (along - np.tanh(along))  # gathers speed within two seconds
+        turn = distance / self.radius
         x, y = self.radius * np.sin(turn), self.radius * (1.0 - np.cos(turn))
         return np.array([x, y, z]), turn
 
@@ -60,12 +60,12 @@ def nod_angle(time_s):
 
 def cast(flight, woods, first_s, mount, nods, rng=None):
     """Ranges (BEAMS,) of a sweep, each beam from where it is cast."""
-    share = np.linspace(0.0, 1.0, BEAMS)
+    fraction = np.linspace(0.0, 1.0, BEAMS)
     ends = [flight.pose(first_s + SWEEP_S * part) for part in (0.0, 1.0)]
-    at = ends[0][0] + share[:, None] * (ends[1][0] - ends[0][0])
-    yaw = ends[0][1] + share * (ends[1][1] - ends[0][1])
+    at = ends[0][0] + fraction[:, None] * (ends[1][0] - ends[0][0])
+    yaw = ends[0][1] + fraction * (ends[1][1] - ends[0][1])
     angle = FIRST + STEP * np.arange(BEAMS)
-    tilt = nod_angle(first_s + SWEEP_S * share)[0] if nods else np.zeros(BEAMS)
+    tilt = nod_angle(first_s + SWEEP_S * fraction)[0] if nods else np.zeros(BEAMS)
     x, y, z = np.cos(tilt) * np.cos(angle), np.sin(angle), -np.sin(tilt) * np.cos(angle)
     c, s = np.cos(yaw), np.sin(yaw)
     ray = np.stack([c * x - s * y, s * x + c * y, z], axis=1)
@@ -106,31 +106,31 @@ def scan_message(time_ns, ranges):
 
 
 def messages(flight, woods, seconds, biases=(0.0, 0.0), seed=0, noise=True):
-    """(when they are heard, topic, message), in order; IMU 200 Hz, scans 20 Hz."""
+    """(when they are received, topic, message), in order; IMU 200 Hz, scans 20 Hz."""
     rng = np.random.default_rng(seed)
-    told = []
+    rows = []
     for k in range(round(200 * seconds)):
         gyro, force = flight.imu(k / 200.0)
         if noise:
             gyro = gyro + rng.normal(0.0, 0.0048, 3)
             force = force + rng.normal(0.0, 0.057, 3)
         now = k * 5 * MS
-        told.append((now, 0, "imu", imu_message(now, gyro + biases[0], force + biases[1])))
+        rows.append((now, 0, "imu", imu_message(now, gyro + biases[0], force + biases[1])))
         if k % 4 == 0:
-            told.append((now, 1, "joint_states", nod(now, *map(float, nod_angle(k / 200.0)))))
+            rows.append((now, 1, "joint_states", nod(now, *map(float, nod_angle(k / 200.0)))))
         if k % 20 == 0:
             height = flight.pose(k / 200.0)[0][2]
-            told.append((now, 2, "range", range_message(now, height if height > 0.3 else -np.inf)))
+            rows.append((now, 2, "range", range_message(now, height if height > 0.3 else -np.inf)))
     for k in range(round(20 * seconds)):
         begin = k * 50 * MS
-        heard = begin + 19 * MS
+        arrival_ns = begin + 19 * MS
         for order, name, mount, nods in (
             (3, "horizontal", LEVEL, False),
             (4, "nodding", NODDING, True),
         ):
             ranges = cast(flight, woods, k / 20.0, mount, nods, rng if noise else None)
-            told.append((heard, order, f"laser/{name}/scan", scan_message(begin, ranges)))
-    return [(when, topic, m) for when, _, topic, m in sorted(told, key=lambda row: row[:2])]
+            rows.append((arrival_ns, order, f"laser/{name}/scan", scan_message(begin, ranges)))
+    return [(when, topic, m) for when, _, topic, m in sorted(rows, key=lambda row: row[:2])]
 
 
 def range_message(time_ns, distance):

@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 
 from volery.core.errors import VoleryError
 from volery_benchmarks.page.browser import open_browser
-from volery_benchmarks.page.looking import wait_for_picture, wait_until
+from volery_benchmarks.page.looking import wait_for_image, wait_until
 from volery_benchmarks.page.serving import PageProcess
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _take(browser: Browser, shot: Shot, path: Path) -> None:
         try:
             page = context.new_page()
             page.goto(f"{server.url}#{shot.view}")
-            wait_for_picture(page)
+            wait_for_image(page)
             _pause_at(server, shot.at_s)
             _settle(page)
             page.screenshot(path=path, type="jpeg", quality=_JPEG_QUALITY)

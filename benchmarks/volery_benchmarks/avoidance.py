@@ -29,7 +29,7 @@ from volery.scenario.schema import Scenario
 from volery_benchmarks.registry import Measured
 
 SEEDS = 50
-WAYS = {
+METHODS = {
     "region": "region_avoidance",
     "whole": "depth_avoidance",
 }
@@ -48,7 +48,7 @@ _PROCESSES = 2
 class Flight:
     """Holds the outcome of one flight."""
 
-    way: str
+    method: str
     field: str
     seed: int
     touched: bool
@@ -59,7 +59,7 @@ class Flight:
 
 def measure(seeds: Sequence[int] = range(1, SEEDS + 1)) -> Measured:
     """Returns collisions, arrivals, metres and seconds, by field and method."""
-    tasks = [(way, field, seed) for field in FIELDS for way in WAYS for seed in seeds]
+    tasks = [(method, field, seed) for field in FIELDS for method in METHODS for seed in seeds]
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(_PROCESSES, spawn) as pool:
         flights = list(pool.map(_fly_task, tasks))
@@ -70,10 +70,10 @@ def figures_of(flights: Sequence[Flight]) -> dict[str, float]:
     """Returns numbers of collisions and arrivals, medians of distance and time."""
     figures: dict[str, float] = {}
     for field in FIELDS:
-        for way in WAYS:
-            own = [f for f in flights if (f.field, f.way) == (field, way)]
+        for method in METHODS:
+            own = [f for f in flights if (f.field, f.method) == (field, method)]
             arrived = [f for f in own if f.arrived]
-            name = f"{field}_{way}"
+            name = f"{field}_{method}"
             figures[f"{name}_collisions"] = sum(f.touched for f in own)
             figures[f"{name}_arrivals"] = len(arrived)
             if arrived:
@@ -86,23 +86,23 @@ def _fly_task(task: tuple[str, str, int]) -> Flight:
     return fly(*task)
 
 
-def fly(way: str, field: str, seed: int) -> Flight:
+def fly(method: str, field: str, seed: int) -> Flight:
     """Crosses one field."""
     with tempfile.TemporaryDirectory() as folder:
-        scenario = field_scenario(way, field, seed, Path(folder))
+        scenario = field_scenario(method, field, seed, Path(folder))
         with Simulation(scenario, threads=1) as simulation:
             uav = simulation.uavs["uav1"]
-            places = [uav.position_map.copy()]
+            positions = [uav.position_map.copy()]
             while not _is_over(simulation):
                 simulation.run(_SLICE_S)
-                places.append(uav.position_map.copy())
-            metres = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+                positions.append(uav.position_map.copy())
+            metres = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
             touched = any(
                 str(event.kind) in ("impact", "collision")
                 for event in simulation.diagnostics.events
             )
-            arrived = not touched and float(places[-1][0]) > _COURSE_M - 2.0
-            return Flight(way, field, seed, touched, arrived, metres, simulation.time_s)
+            arrived = not touched and float(positions[-1][0]) > _COURSE_M - 2.0
+            return Flight(method, field, seed, touched, arrived, metres, simulation.time_s)
 
 
 def _is_over(simulation: Simulation) -> bool:
@@ -111,14 +111,14 @@ def _is_over(simulation: Simulation) -> bool:
     return uav.crashed or landed or simulation.time_s >= simulation.scenario.duration_s
 
 
-def field_scenario(way: str, field: str, seed: int, folder: Path) -> Scenario:
+def field_scenario(method: str, field: str, seed: int, folder: Path) -> Scenario:
     """Returns the scenario `obstacle_field` with another seed, node and kind of obstacles.
 
     Writes the files that the scenario needs into `folder`.
     """
     data: dict[str, Any] = load_scenario("obstacle_field").model_dump()
     data["seed"] = seed
-    data["types"]["scout"]["nodes"][0]["node"] = WAYS[way]
+    data["types"]["scout"]["nodes"][0]["node"] = METHODS[method]
     if field == "blocks":
         data["world"]["forest"] = None
         data["world"]["grid_map"] = {

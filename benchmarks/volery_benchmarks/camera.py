@@ -28,7 +28,7 @@ from volery.world.terrain import Terrain
 from volery_benchmarks.fleet import fleet_scenario, largest
 from volery_benchmarks.forest_beams import EXTENT_M, forest_of, scans_of
 
-_PLACES = 10
+_NUM_UAVS = 10
 _ROUNDS = 7
 _SECONDS = 3.0
 _CAMERA: dict[str, Any] = {
@@ -44,20 +44,20 @@ def measure() -> dict[str, float]:
     """Returns the figures of the bench `camera`."""
     uavs, factor = largest(_real_time_factor, first=4, step=1)
     return {
-        **_pictures(),
+        **_images(),
         "realtime_camera_uavs": float(uavs),
         "real_time_factor_there": factor,
     }
 
 
-def _pictures() -> dict[str, float]:
+def _images() -> dict[str, float]:
     terrain = Terrain.flat(EXTENT_M)
     scene = Scene(terrain, forest_of(EXTENT_M, terrain))
     teams = {"1_thread": Workers(1), "2_threads": Workers(2)}
     try:
         _, history = scans_of(scene, EXTENT_M)
         mounts, model, light = stack_mounts([make_mount()]), CameraModel(), make_light()
-        shots = [make_batch([uav], [0], [0], [0], [0], mounts) for uav in range(_PLACES)]
+        shots = [make_batch([uav], [0], [0], [0], [0], mounts) for uav in range(_NUM_UAVS)]
 
         def shoot(parts: Any, team: Workers) -> None:
             for shot in shots:
@@ -68,7 +68,7 @@ def _pictures() -> dict[str, float]:
             for name, parts in _PARTS.items()
             for threads, team in teams.items()
         }
-        return {name: 1e3 * s / _PLACES for name, s in _median_s(calls).items()}
+        return {name: 1e3 * s / _NUM_UAVS for name, s in _median_s(calls).items()}
     finally:
         for team in teams.values():
             team.close()

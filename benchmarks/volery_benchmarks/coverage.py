@@ -103,12 +103,12 @@ def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float
     }
     with (
         tempfile.TemporaryDirectory() as folder,
-        PeerProcess(python, _SCRIPT, request, Path(folder)) as conversation,
+        PeerProcess(python, _SCRIPT, request, Path(folder)) as process,
     ):
-        told = ", ".join(f"{k} {v}" for k, v in conversation.versions().items())
-        ours, theirs = _medians([lambda: _timed(case), conversation.round])
-        facts = conversation.facts()
-    versions["peer"] = told
+        peer_versions = ", ".join(f"{k} {v}" for k, v in process.versions().items())
+        ours, theirs = _medians([lambda: _timed(case), process.round])
+        facts = process.facts()
+    versions["peer"] = peer_versions
     if sum(facts["sub_cells"]) != 4 * int(case.free().sum()):
         raise PeerError(f"its tours have {facts['sub_cells']} sub-cells, which is not all of them")
     return {
@@ -135,7 +135,7 @@ def _timed(case: Case) -> float:
 def _first_plan() -> float:
     """Returns the time of a new process's first plan, s, with all kernels cached on disk."""
     plan(CASES[1])
-    told = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-P", "-c", _FIRST_PLAN], capture_output=True, text=True, check=True
     )
-    return float(told.stdout)
+    return float(completed.stdout)

@@ -49,7 +49,7 @@ class CrowdFlight(NamedTuple):
     """Whether all others arrived."""
     seconds: float
     """Until then, from the first command; the limit if they did not."""
-    least_distance_m: float
+    min_distance_m: float
     """Between two UAVs, once a second."""
 
 
@@ -62,7 +62,7 @@ def circle_swap(seed: int) -> Crowd:
 
 
 def crossing_streams(seed: int) -> Crowd:
-    """Two blocks of 50 UAVs, 3 m apart, whose ways cross at a right angle."""
+    """Two blocks of 50 UAVs, 3 m apart, whose paths cross at a right angle."""
     rng = np.random.default_rng(seed)
     block = 3.0 * np.stack(np.meshgrid(np.arange(5), np.arange(10)), axis=-1).reshape(-1, 2)
     block = block - block.mean(axis=0)
@@ -115,13 +115,13 @@ def fly(crowd: Crowd, behaviour: str, seed: int) -> CrowdFlight:
     """Flies a run until all UAVs in the air have arrived."""
     scenario = parse_scenario(_scenario(crowd, behaviour, seed), where="crowd")
     status: dict[str, Any] = {}
-    least = np.inf
+    min_distance_m = np.inf
     with Simulation(scenario, threads=1) as simulation:
 
         def on_status(published: Published) -> None:
-            nonlocal least
+            nonlocal min_distance_m
             status.update(json.loads(published.message.data))
-            least = min(least, status["least_distance_m"] or np.inf)
+            min_distance_m = min(min_distance_m, status["least_distance_m"] or np.inf)
 
         simulation.graph.subscribe("/flock/status", on_status)
         simulation.run_until(lambda: bool(status), _TAKE_OFF_S)
@@ -132,7 +132,7 @@ def fly(crowd: Crowd, behaviour: str, seed: int) -> CrowdFlight:
         except WaitTimeoutError:
             arrived = False
         crashed = int(simulation.vehicles.state().crashed.sum())
-        return CrowdFlight(crashed, arrived, simulation.time_s - begun, least)
+        return CrowdFlight(crashed, arrived, simulation.time_s - begun, min_distance_m)
 
 
 def _scenario(crowd: Crowd, behaviour: str, seed: int) -> dict[str, Any]:
@@ -169,7 +169,7 @@ def _scenario(crowd: Crowd, behaviour: str, seed: int) -> dict[str, Any]:
         },
         "nodes": [{"node": "flock", "parameters": parameters}],
         "uavs": [
-            {"type": "scout", "position_m": place, "on_start": "take_off"}
-            for place in crowd.start.tolist()
+            {"type": "scout", "position_m": position, "on_start": "take_off"}
+            for position in crowd.start.tolist()
         ],
     }

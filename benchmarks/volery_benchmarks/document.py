@@ -62,10 +62,10 @@ def _table(bench: Bench, runs: Sequence[Result]) -> str:
     first = runs[0]
     if bench.name == "peers":
         return peers_table(first.figures, first.versions)
-    told = [k for k in first.figures if not (bench.apart and k.startswith(bench.apart))]
+    names = [k for k in first.figures if not (bench.apart and k.startswith(bench.apart))]
     rows = "".join(
         _row(bench, name, [run.figures[name] for run in runs if name in run.figures])
-        for name in told
+        for name in names
     )
     head = "measured" if len(runs) == 1 else f"median of {len(runs)} runs"
     return f"| figure | {head} | bound |\n|---|---:|---:|\n{rows}"

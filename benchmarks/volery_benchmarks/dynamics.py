@@ -47,9 +47,9 @@ def measure() -> dict[str, float]:
 def _fleet(count: int) -> Fleet:
     """Returns UAVs on the way to goals 20 m away, so that every control layer is active."""
     side = np.arange(count)
-    place = np.column_stack([2.0 * (side % 40), 2.0 * (side // 40), np.full(count, 30.0)])
+    positions = np.column_stack([2.0 * (side % 40), 2.0 * (side // 40), np.full(count, 30.0)])
     attitude = rotations.from_rpy(np.zeros(count), 0.0, 0.01 * side)
-    fleet = Fleet([load_airframe("f450")] * count, place, attitude)
+    fleet = Fleet([load_airframe("f450")] * count, positions, attitude)
     for i in range(count):
-        fleet.command_position(i, place[i] + [20.0, 0.0, 5.0], yaw=0.5)
+        fleet.command_position(i, positions[i] + [20.0, 0.0, 5.0], yaw=0.5)
     return fleet

@@ -15,7 +15,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 from volery.world.trees import DetailLevel
 
-REACH_M = 30.0
+MAX_RANGE_M = 30.0
 EXTENT_M, TREES = 500.0, 5000
 PIECE_M = 150.0
 """Side of the piece that is flattened to triangles for peers, m; it holds 450 of the trees."""
@@ -37,11 +37,11 @@ def forest_of(extent: float, terrain: Terrain) -> Forest:
 def scans_of(scene: Scene, extent: float) -> tuple[RayBatch, PoseHistory]:
     """Returns two scans of each UAV from positions at least half a metre from any surface."""
     rng = np.random.default_rng(1)
-    places = rng.uniform((0, 0, 2), (extent, extent, 5), (50 * _UAVS, 3))
-    inner = (places[:, :2] > 0.06 * extent) & (places[:, :2] < 0.94 * extent)
-    places = places[inner.all(axis=1)]
-    free = scene.clearance(places, 0.5).instance < 0
-    places = places[free][:_UAVS]
+    positions = rng.uniform((0, 0, 2), (extent, extent, 5), (50 * _UAVS, 3))
+    inner = (positions[:, :2] > 0.06 * extent) & (positions[:, :2] < 0.94 * extent)
+    positions = positions[inner.all(axis=1)]
+    free = scene.clearance(positions, 0.5).instance < 0
+    positions = positions[free][:_UAVS]
     yaw = rng.uniform(-np.pi, np.pi, _UAVS)
     attitude = np.column_stack([np.zeros((_UAVS, 2)), np.sin(yaw / 2), np.cos(yaw / 2)])
     mounts = stack_mounts([make_mount(), make_mount(amplitude_rad=np.pi / 4, period_s=2.0)])
@@ -53,7 +53,7 @@ def scans_of(scene: Scene, extent: float) -> tuple[RayBatch, PoseHistory]:
         0,
         mounts,
     )
-    return batch, new_history(places, attitude, 1_000_000)
+    return batch, new_history(positions, attitude, 1_000_000)
 
 
 def rays_of(batch: RayBatch, history: PoseHistory) -> tuple[Array, Array]:

@@ -42,24 +42,26 @@ class Flown:
     """Time and target positions (T, 2) of each published list."""
 
     @property
-    def way(self) -> RecordedTrajectory:
+    def trajectory(self) -> RecordedTrajectory:
         """True trajectory."""
         return RecordedTrajectory.of_rows(self.truth)
 
     @property
-    def own_way(self) -> RecordedTrajectory:
+    def own_trajectory(self) -> RecordedTrajectory:
         """Estimated trajectory."""
         return RecordedTrajectory.of_rows(self.estimate)
 
-    def way_and_own(self) -> tuple[Array, Array]:
+    def true_and_own(self) -> tuple[Array, Array]:
         """Returns true and estimated positions (N, 3), m, at the times of the estimates."""
-        own, way = self.own_way, self.way
-        known = common_times(own.time_s, way.time_s)
-        return at_times(way.time_s, way.position, own.time_s[known]), own.position[known]
+        own, trajectory = self.own_trajectory, self.trajectory
+        known = common_times(own.time_s, trajectory.time_s)
+        return at_times(trajectory.time_s, trajectory.position, own.time_s[known]), own.position[
+            known
+        ]
 
     def alignment(self) -> Alignment | None:
         """Returns the alignment of the estimated to the true trajectory; None if too short."""
-        true, own = self.way_and_own()
+        true, own = self.true_and_own()
         return umeyama(own, true) if len(own) > 3 else None
 
 
@@ -82,11 +84,11 @@ class Search:
 
     def distances_m(self) -> dict[str, float]:
         """Returns each UAV's distance over ground, m."""
-        return {name: uav.way.length_m for name, uav in self.uavs.items()}
+        return {name: uav.trajectory.length_m for name, uav in self.uavs.items()}
 
     def ate_rmse_m(self) -> dict[str, float]:
         """Returns each UAV's absolute trajectory error, m, after alignment."""
-        pairs = {name: uav.way_and_own() for name, uav in self.uavs.items()}
+        pairs = {name: uav.true_and_own() for name, uav in self.uavs.items()}
         return {name: ate_rmse_m(own, true) for name, (true, own) in pairs.items() if len(own) > 3}
 
     def searched_m2(self, until_s: float = np.inf) -> float:
@@ -95,9 +97,9 @@ class Search:
         x, y = (np.arange(a + _CELL_M / 2.0, b, _CELL_M) for a, b in ((x0, x1), (y0, y1)))
         seen = np.zeros((len(y), len(x)), np.bool_)
         for uav in self.uavs.values():
-            way = uav.way
-            for place in _thinned(way.position[way.time_s <= until_s, :2]):
-                seen |= np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= SIGHT_M
+            trajectory = uav.trajectory
+            for position in _thinned(trajectory.position[trajectory.time_s <= until_s, :2]):
+                seen |= np.hypot(x[None, :] - position[0], y[:, None] - position[1]) <= SIGHT_M
         return float(seen.sum()) * _CELL_M**2
 
     def trunk_errors_m(self, *, aligned: bool = False) -> Array:
@@ -109,7 +111,7 @@ class Search:
         """
         errors = [np.zeros(0)]
         for uav in self.uavs.values():
-            found = uav.survey.trunks(uav.own_way).seen_often
+            found = uav.survey.trunks(uav.own_trajectory).seen_often
             alignment = uav.alignment() if aligned else None
             if alignment is not None:
                 found = alignment.apply(found)
@@ -120,28 +122,28 @@ class Search:
 
     def target_delays_s(self) -> list[float]:
         """Returns each target's delay from the first list with it to the last, s; inf: never."""
-        finds = [
-            (seconds, place)
+        detections = [
+            (seconds, position)
             for uav in self.uavs.values()
-            for seconds, places in uav.targets
-            for place in places
+            for seconds, positions in uav.targets
+            for position in positions
         ]
         delays, known = [], np.zeros((0, 2))
-        for _, place in sorted(finds, key=lambda each: each[0]):
-            if len(known) and np.hypot(*(known - place).T).min() <= _TARGET_GATE_M:
+        for _, position in sorted(detections, key=lambda each: each[0]):
+            if len(known) and np.hypot(*(known - position).T).min() <= _TARGET_GATE_M:
                 continue
-            known = np.concatenate([known, place[None]])
-            heard = [_first_heard(uav, place) for uav in self.uavs.values()]
-            delays.append(max(heard) - min(heard))
+            known = np.concatenate([known, position[None]])
+            delays_s = [_first_received(uav, position) for uav in self.uavs.values()]
+            delays.append(max(delays_s) - min(delays_s))
         return delays
 
     def target_errors_m(self) -> list[float]:
         """Returns distances of hidden targets from the nearest find, m, without those not found."""
-        finds = [p for uav in self.uavs.values() if uav.targets for p in uav.targets[-1][1]]
+        detections = [p for uav in self.uavs.values() if uav.targets for p in uav.targets[-1][1]]
         errors = []
         for mesh in self.scenario.world.meshes:
-            if (mesh.name or "").startswith("target") and finds:
-                away = np.hypot(*(np.array(finds) - mesh.position_m[:2]).T).min()
+            if (mesh.name or "").startswith("target") and detections:
+                away = np.hypot(*(np.array(detections) - mesh.position_m[:2]).T).min()
                 errors += [float(away)] if away <= 2.0 * _TARGET_GATE_M else []
         return errors
 
@@ -240,19 +242,19 @@ def _take_joints(survey: TrunkSurvey, published: Published) -> None:
 
 
 def _take_targets(lists: list[tuple[float, Array]], published: Published) -> None:
-    places = [(t.position.x, t.position.y) for t in published.message.targets]
-    lists.append((published.time_ns * 1e-9, np.array(places).reshape(-1, 2)))
+    positions = [(t.position.x, t.position.y) for t in published.message.targets]
+    lists.append((published.time_ns * 1e-9, np.array(positions).reshape(-1, 2)))
 
 
-def _first_heard(uav: Flown, place: Array) -> float:
-    for seconds, places in uav.targets:
-        if len(places) and np.hypot(*(places - place).T).min() <= _TARGET_GATE_M:
+def _first_received(uav: Flown, position: Array) -> float:
+    for seconds, positions in uav.targets:
+        if len(positions) and np.hypot(*(positions - position).T).min() <= _TARGET_GATE_M:
             return seconds
     return np.inf
 
 
-def _thinned(way: Array, step_m: float = 0.5) -> Array:
+def _thinned(path: Array, step_m: float = 0.5) -> Array:
     """Returns positions (N, 2) of a path at least `step_m` apart along it."""
-    along = np.concatenate([[0.0], np.hypot(*np.diff(way, axis=0).T).cumsum()])
+    along = np.concatenate([[0.0], np.hypot(*np.diff(path, axis=0).T).cumsum()])
     kept = np.diff(along // step_m, prepend=-1.0) > 0.0
-    return way[kept[: len(way)]]
+    return path[kept[: len(path)]]

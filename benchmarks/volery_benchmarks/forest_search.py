@@ -54,11 +54,11 @@ def figures_of_sparse(search: Search) -> dict[str, float]:
 def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
     """Returns the figures of a team's flights, and of one UAV's with the first of their seeds."""
     errors = [error for search in team for error in search.ate_rmse_m().values()]
-    distances = [way for search in team for way in search.distances_m().values()]
+    distances = [distance for search in team for distance in search.distances_m().values()]
     delays = [delay for search in team for delay in search.target_delays_s()]
-    places = [error for search in team for error in search.target_errors_m()]
+    errors_m = [error for search in team for error in search.target_errors_m()]
     trunks = np.concatenate([search.trunk_errors_m(aligned=True) for search in team])
-    as_told = np.concatenate([search.trunk_errors_m() for search in team])
+    unaligned_m = np.concatenate([search.trunk_errors_m() for search in team])
     figures = {
         "realtime_factor": statistics.median(search.real_time_factor for search in team),
         "realtime_factor_worst": min(search.real_time_factor for search in team),
@@ -78,12 +78,12 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
     if len(trunks):
         figures["trunks"] = float(len(trunks))
         figures["trunks_within_half_m"] = float((trunks <= _TRUNK_M).mean())
-        figures["trunks_within_half_m_unaligned"] = float((as_told <= _TRUNK_M).mean())
+        figures["trunks_within_half_m_unaligned"] = float((unaligned_m <= _TRUNK_M).mean())
     else:
         failures["trunks_within_half_m"] = "no trunk was seen three times"
     if delays:
         figures["target_delay_s_worst"] = max(delays)
-        figures["target_error_m_median"] = statistics.median(places)
+        figures["target_error_m_median"] = statistics.median(errors_m)
     else:
         failures["target_delay_s_worst"] = "no target was found"
     return Measured(figures, failures)

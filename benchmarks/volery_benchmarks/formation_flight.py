@@ -29,7 +29,7 @@ class FormationFlight:
     """From the take-off's end to the V, with flying to the random starts."""
     recovery_s: float
     """From the loss of UAVs to the V of the others."""
-    least_distance_m: float
+    min_distance_m: float
     """Between two UAVs in the air."""
     real_time_factor: float
     """Until the V."""
@@ -51,7 +51,7 @@ def fly(seed: int, uavs: int, lost: int) -> FormationFlight:
         for name in rng.choice(sorted(simulation.uavs), lost, replace=False):
             simulation.uavs[name].land()
         again = watch.wait_for_v(_RECOVER_S, uavs - lost) if time_to_v > 0.0 else math.nan
-        return FormationFlight(time_to_v, again - begun, watch.least_distance_m, factor)
+        return FormationFlight(time_to_v, again - begun, watch.min_distance_m, factor)
 
 
 class _Watch:
@@ -60,7 +60,7 @@ class _Watch:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._status: dict[str, Any] = {"phase": "ascend", "members": [], "cost": math.inf}
-        self.least_distance_m = math.inf
+        self.min_distance_m = math.inf
         simulation.graph.subscribe(_TOPIC, self._on_status)
 
     @property
@@ -74,7 +74,7 @@ class _Watch:
         in_air = vehicles.position_map[~vehicles.crashed]
         apart = np.linalg.norm(in_air[:, None] - in_air, axis=2)
         apart[np.diag_indices(len(apart))] = math.inf
-        self.least_distance_m = min(self.least_distance_m, float(apart.min(initial=math.inf)))
+        self.min_distance_m = min(self.min_distance_m, float(apart.min(initial=math.inf)))
 
     def wait_for_v(self, timeout_s: float, members: int | None = None) -> float:
         """Returns the time of the next V, s; NaN if there is none until the timeout."""

@@ -33,14 +33,14 @@ def play(games: int) -> dict[str, float]:
     """Returns the shares of games that the controller wins."""
     with ThreadPoolExecutor(usable_cores()) as pool:
 
-        def share(game: Callable[[int], bool]) -> float:
+        def fraction(game: Callable[[int], bool]) -> float:
             return sum(pool.map(game, range(games))) / games
 
         return {
-            "games_won_one_removed": share(lambda seed: _removal(seed, 1)),
-            "games_won_two_removed": share(lambda seed: _removal(seed, 2)),
-            "games_won_random_displacement": share(lambda seed: _displacement(seed, _at_random)),
-            "games_won_planned_displacement": share(lambda seed: _displacement(seed, _worst)),
+            "games_won_one_removed": fraction(lambda seed: _removal(seed, 1)),
+            "games_won_two_removed": fraction(lambda seed: _removal(seed, 2)),
+            "games_won_random_displacement": fraction(lambda seed: _displacement(seed, _at_random)),
+            "games_won_planned_displacement": fraction(lambda seed: _displacement(seed, _worst)),
         }
 
 

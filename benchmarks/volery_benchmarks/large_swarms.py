@@ -47,15 +47,17 @@ def real_time_factor(count: int) -> float:
     side = math.ceil(math.sqrt(count))
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)[:count]
     start = _APART_M * (grid - grid.mean(axis=0))
-    reach = float(np.abs(start).max()) + 30.0
-    around = Surroundings(arena=np.array([-reach, -reach, reach, reach]))
+    half_width_m = float(np.abs(start).max()) + 30.0
+    around = Surroundings(
+        arena=np.array([-half_width_m, -half_width_m, half_width_m, half_width_m])
+    )
     behaviour = Vasarhelyi()
     preferred = _SPEED_M_S * np.stack(
         [np.cos(angle := np.arange(count) * 2.399), np.sin(angle)], axis=1
     )
     factors = []
     with VectorizedSimulation(
-        parse_scenario(_scenario(start, reach), where="bench"), 1, threads=usable_cores()
+        parse_scenario(_scenario(start, half_width_m), where="bench"), 1, threads=usable_cores()
     ) as envs:
         for number in range(_ROUNDS + 1):
             begun = time.perf_counter()
@@ -75,10 +77,10 @@ def real_time_factor(count: int) -> float:
     return statistics.median(factors)
 
 
-def _scenario(start: Any, reach: float) -> dict[str, Any]:
+def _scenario(start: Any, half_width_m: float) -> dict[str, Any]:
     return {
         "name": "large_swarm",
-        "world": {"terrain": {"kind": "flat", "extent_m": 4.0 * reach}},
+        "world": {"terrain": {"kind": "flat", "extent_m": 4.0 * half_width_m}},
         "types": {"bird": {"airframe": "f450"}},
         "uavs": [{"type": "bird", "position_m": [float(x), float(y), _HEIGHT_M]} for x, y in start],
     }

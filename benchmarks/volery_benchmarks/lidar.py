@@ -33,8 +33,8 @@ from volery.world.terrain import Terrain
 from volery.world.trees import DetailLevel
 from volery_benchmarks.forest_beams import (
     EXTENT_M,
+    MAX_RANGE_M,
     PIECE_M,
-    REACH_M,
     flattened,
     forest_of,
     rays_of,
@@ -42,7 +42,7 @@ from volery_benchmarks.forest_beams import (
 )
 from volery_benchmarks.registry import Measured
 
-_FEWEST_ROUNDS, _MOST_ROUNDS = 5, 40
+_FEWEST_ROUNDS, _MAX_ROUNDS = 5, 40
 _BUDGET_S = 40.0
 """Duration of repeated casting; `quick` takes the fewest rounds."""
 
@@ -67,7 +67,7 @@ def _take_turns(
     for call in calls.values():
         call()
     end = time.perf_counter() + seconds_budget
-    for round_ in range(_MOST_ROUNDS):
+    for round_ in range(_MAX_ROUNDS):
         if round_ >= _FEWEST_ROUNDS and time.perf_counter() > end:
             break
         for name, call in calls.items():
@@ -85,7 +85,7 @@ def _whole_forest(seconds_budget: float) -> dict[str, float]:
     model = load_lidar()
     batch, history = scans_of(one, EXTENT_M)
     origins, directions = rays_of(batch, history)
-    hits = one.cast(origins, directions, REACH_M)
+    hits = one.cast(origins, directions, MAX_RANGE_M)
     exact = model.without_noise()
     calls = {
         "rays_per_s_1_thread": lambda: sample_lidars(one, exact, batch, history),
@@ -93,16 +93,16 @@ def _whole_forest(seconds_budget: float) -> dict[str, float]:
         "visual_rays_per_s_1_thread": lambda: sample_lidars(visual, exact, batch, history),
         "noisy_rays_per_s_1_thread": lambda: sample_lidars(one, model, batch, history),
         "noisy_rays_per_s_2_threads": lambda: sample_lidars(two, model, batch, history),
-        "cast_rays_per_s_1_thread": lambda: one.cast(origins, directions, REACH_M, out=hits),
+        "cast_rays_per_s_1_thread": lambda: one.cast(origins, directions, MAX_RANGE_M, out=hits),
     }
     seconds = _take_turns(calls, seconds_budget)
     points = history.position[0]
     clearance = _take_turns({"clearance": lambda: one.clearance(points, 5.0, False)}, 0.5)
-    share = float((one.cast(origins, directions, REACH_M).instance >= 0).mean())
+    fraction = float((one.cast(origins, directions, MAX_RANGE_M).instance >= 0).mean())
     for scene in (one, two, visual):
         scene.close()
     figures = {name: len(origins) / value for name, value in seconds.items()}
-    figures["share_of_rays_that_hit"] = share
+    figures["share_of_rays_that_hit"] = fraction
     figures["clearance_us"] = clearance["clearance"] / len(points) * 1e6
     return figures
 
@@ -115,7 +115,7 @@ def _peers(seconds_budget: float, *, with_open3d: bool) -> dict[str, float]:
     origins, directions = rays_of(*scans_of(scene, PIECE_M))
     whole = concatenate(flattened(terrain, forest))
     calls: dict[str, Callable[[], object]] = {
-        "ours": lambda: scene.cast(origins, directions, REACH_M),
+        "ours": lambda: scene.cast(origins, directions, MAX_RANGE_M),
         "ratio_to_embreex_run": _embreex_call(whole, origins, directions),
     }
     if with_open3d:
@@ -145,11 +145,11 @@ def _embreex_call(whole: Mesh, origins: Array, directions: Array) -> Callable[[]
     scene: Any = EmbreeScene(_embreex_device())
     mesh = TriangleMesh(scene, whole.vertices.copy(), whole.triangles.astype(np.int32))
     o, d = origins.astype(np.float32), directions.astype(np.float32)
-    reach = np.full(len(o), REACH_M, dtype=np.float32)
+    max_range = np.full(len(o), MAX_RANGE_M, dtype=np.float32)
 
     def call() -> object:
         assert mesh is not None
-        return scene.run(o, d, dists=reach, query="DISTANCE")
+        return scene.run(o, d, dists=max_range, query="DISTANCE")
 
     return call
 

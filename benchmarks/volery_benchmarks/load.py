@@ -25,12 +25,12 @@ def measure(*, quick: bool = False) -> dict[str, float]:
     fleets, seconds = (_QUICK_FLEETS, _QUICK_SECONDS) if quick else (_FLEETS, _SECONDS)
     figures: dict[str, float] = {}
     for uavs in fleets:
-        for part, percent in shares(uavs, seconds).items():
+        for part, percent in percentages(uavs, seconds).items():
             figures[f"{part}_{uavs}_uav{'s' if uavs > 1 else ''}"] = percent
     return figures
 
 
-def shares(uavs: int, seconds: float) -> dict[str, float]:
+def percentages(uavs: int, seconds: float) -> dict[str, float]:
     """Returns percent of one core at real time by part, and of the whole process."""
     scenario = search_scenario(uavs, 1, _CLIMB_S + seconds + 1.0)
     with Simulation(scenario, threads=1) as simulation:

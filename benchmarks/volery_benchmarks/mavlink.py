@@ -74,8 +74,8 @@ def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
         simulation.run(_LIFT_S, speed=1.0)
         before = time.process_time()
         simulation.run(_STEADY_S, speed=1.0)
-        share = (time.process_time() - before) / _STEADY_S
-        return share, _ask(simulation) if streams else []
+        core_fraction = (time.process_time() - before) / _STEADY_S
+        return core_fraction, _ask(simulation) if streams else []
 
 
 def _ask(simulation: Simulation) -> list[float]:

@@ -260,8 +260,8 @@ BENCHES: dict[str, Bench] = {
             "Search: a UAV's call to another one, from the caller to the handler, and back; each "
             "node in its own process, or both in lock step",
             {
-                f"{way}_one_way_ms": Bound(10.0, at_most=True)
-                for way in ("lock_step", "rosbridge", "ros1")
+                f"{connection}_one_way_ms": Bound(10.0, at_most=True)
+                for connection in ("lock_step", "rosbridge", "ros1")
             },
         ),
         Bench(

@@ -32,7 +32,7 @@ _DOMAIN = 20 + os.getpid() % 80
 _SIZES = (0, 10_000, 100_000, 250_000, 500_000, 1_000_000)
 _STREAM_S = 10.0
 _STOPPED_S = 5.0
-_PATIENCE_S = 20.0
+_TIMEOUT_S = 20.0
 _SETTLED_S = 1.0
 
 
@@ -75,7 +75,7 @@ class _Peer:
 
     def finish(self) -> list[tuple[str, int, int, int]]:
         """Returns topic, size, stamp and arrival time (ns) of all received messages."""
-        out, _ = self._process.communicate("\n", timeout=_PATIENCE_S)
+        out, _ = self._process.communicate("\n", timeout=_TIMEOUT_S)
         return [(str(t), int(size), int(stamp), int(at)) for t, size, stamp, at in json.loads(out)]
 
 
@@ -108,12 +108,12 @@ def _streams() -> dict[str, float]:
         for topic in topics:
             simulation.post(lambda t=topic: simulation.graph.subscribe(t, note)).result()  # type: ignore[misc]
         peer = _Peer("scan", topics)
-        _wait_for_subscribers(simulation, topics, least=2)
+        _wait_for_subscribers(simulation, topics, min_count=2)
         factor = _real_time_factor(simulation, _STREAM_S)
         got = [(topic, stamp, at) for topic, _, stamp, at in peer.finish()]
         figures = {**stream_ages([got], dict(published)), "stream_real_time_factor": factor}
         stopped = _Peer("scan", topics)
-        _wait_for_subscribers(simulation, topics, least=2)
+        _wait_for_subscribers(simulation, topics, min_count=2)
         stopped.signal(signal.SIGSTOP)
         figures["stopped_real_time_factor"] = _real_time_factor(simulation, _STOPPED_S)
         stopped.signal(signal.SIGCONT)
@@ -127,12 +127,12 @@ def _real_time_factor(simulation: Simulation, wall_s: float) -> float:
     return (simulation.time_s - before_s) / (time.perf_counter() - began_s)
 
 
-def _wait_for_subscribers(simulation: Simulation, topics: list[str], least: int = 1) -> None:
-    """Waits until each topic has `least` subscribers, and then for DDS to match both sides."""
-    end = time.monotonic() + _PATIENCE_S
+def _wait_for_subscribers(simulation: Simulation, topics: list[str], min_count: int = 1) -> None:
+    """Waits until each topic has `min_count` subscribers, and then for DDS to match both sides."""
+    end = time.monotonic() + _TIMEOUT_S
     wanted = set(topics)
-    while wanted - {t.name for t in simulation.graph.topics() if t.subscribers >= least}:
+    while wanted - {t.name for t in simulation.graph.topics() if t.subscribers >= min_count}:
         if time.monotonic() > end:
-            raise VoleryError(f"no subscriber within {_PATIENCE_S:.0f} s")
+            raise VoleryError(f"no subscriber within {_TIMEOUT_S:.0f} s")
         time.sleep(0.02)
     time.sleep(_SETTLED_S)

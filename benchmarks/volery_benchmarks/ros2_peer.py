@@ -39,13 +39,13 @@ def main() -> None:
         participant.reader(TopicSpec(node, topic, msgtype, _BEST_EFFORT), taker(topic))
     participant.announce()
     sys.stdin.readline()
-    told = []
+    received = []
     for topic, data, at in came:
         message = decode_cdr(data, msgtype)
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         size = message.data.size if kind == "image" else message.ranges.size
-        told.append((topic, size, stamp, at))
-    sys.stdout.write(json.dumps(told))
+        received.append((topic, size, stamp, at))
+    sys.stdout.write(json.dumps(received))
     participant.close()
 
 

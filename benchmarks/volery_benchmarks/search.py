@@ -156,10 +156,10 @@ def exchange(via: str, port: int) -> list[list[int]]:
         time.sleep(_START_S)
         with _peer(via, port, "calling") as calling:
             out, _ = calling.communicate(timeout=_TIMEOUT_S)
-    told = json.loads(out.splitlines()[-1]) if out else {"took": [], "problem": "it ended early"}
-    if len(told["took"]) < _WARM_UP + _CALLS:
-        raise VoleryError(f"the calls of {JOIN} on {via} failed: {told['problem']}")
-    return [[int(ns) for ns in pair] for pair in told["took"]]
+    result = json.loads(out.splitlines()[-1]) if out else {"took": [], "problem": "it ended early"}
+    if len(result["took"]) < _WARM_UP + _CALLS:
+        raise VoleryError(f"the calls of {JOIN} on {via} failed: {result['problem']}")
+    return [[int(ns) for ns in pair] for pair in result["took"]]
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""Submissions for the grading of the bench `verdicts`: fair pilots, and hostile ones."""
+"""Submissions for the grading of the bench `verdicts`: fair nodes, and hostile ones."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def _flights(quick: bool) -> dict[str, float]:
             figures |= {
                 "time_to_v_s": float(np.nanmedian(times)),
                 "v_success": float(np.isfinite(times).mean()),
-                "least_distance_m": min(flight.least_distance_m for flight in flights),
+                "least_distance_m": min(flight.min_distance_m for flight in flights),
                 "v_real_time_factor": statistics.median(f.real_time_factor for f in flights),
             }
     return figures
@@ -100,7 +100,7 @@ def _crowd(situation: str, quick: bool) -> dict[str, float]:
                 ("collisions", float(sum(flight.crashed > 0 for flight in flights))),
                 ("arrived", statistics.fmean(flight.arrived for flight in flights)),
                 ("s_median", statistics.median(flight.seconds for flight in flights)),
-                ("least_distance_m", min(flight.least_distance_m for flight in flights)),
+                ("least_distance_m", min(flight.min_distance_m for flight in flights)),
             )
         }
     return figures
@@ -127,7 +127,7 @@ def _start(seed: int) -> tuple[Array, Array]:
     """Returns positions and velocities (N, 2) of a random flock."""
     rng = np.random.default_rng(seed)
     while True:
-        places = rng.uniform(0.0, _BOX, (_BIRDS, 2))
-        apart = np.linalg.norm(places[:, None] - places, axis=2)
+        positions = rng.uniform(0.0, _BOX, (_BIRDS, 2))
+        apart = np.linalg.norm(positions[:, None] - positions, axis=2)
         if apart[np.triu_indices(_BIRDS, 1)].min() >= _APART:
-            return places, rng.uniform(*_SPEEDS, (_BIRDS, 2))
+            return positions, rng.uniform(*_SPEEDS, (_BIRDS, 2))

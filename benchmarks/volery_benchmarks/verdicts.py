@@ -179,10 +179,10 @@ def _search(quick: bool) -> dict[str, float]:
         with results.locked(), closing(executor_of(loaded, options, results)) as executor:
             executor.prepare()
 
-            def flights(kind: Callable[[int, int], Sampler], seed: int, most: int) -> int:
+            def flights(kind: Callable[[int, int], Sampler], seed: int, max_flights: int) -> int:
                 search = FailureSearch(loaded, variations, (1, 1), executor)
-                found = search.search(kind(search.dimensions, seed), most)
-                return most + 1 if found is None else found.flights
+                found = search.search(kind(search.dimensions, seed), max_flights)
+                return max_flights + 1 if found is None else found.flights
 
             guided = [flights(TpeSampler, seed, _MAX_FLIGHTS) for seed in seeds]
             random = [flights(RandomSampler, seed, _MAX_RANDOM_FLIGHTS) for seed in seeds]

@@ -21,12 +21,12 @@ from volery.world.weather import Weather
 FLAT = Terrain.flat(1000.0, 0.0, (-500.0, -500.0))
 
 
-def own(name, places, **rotors) -> Airframe:
+def own(name, rotor_places, **rotors) -> Airframe:
     """A user's vehicle: an F450's body with other rotors."""
     data = load_airframe("f450").model_dump()
     data |= {"name": name, "title": name, "battery": None}
     data["body"]["collision_radius_m"] = 0.6
-    data["rotors"] |= {"places": places, **rotors}
+    data["rotors"] |= {"places": rotor_places, **rotors}
     return Airframe.model_validate(data)
 
 
@@ -35,20 +35,20 @@ def around(count):
 
 
 def hexarotor():
-    places = [
+    rotor_places = [
         {
             "position_m": (0.3 * math.cos(a), 0.3 * math.sin(a), 0.05),
             "direction": "ccw" if k % 2 else "cw",
         }
         for k, a in enumerate(around(6))
     ]
-    return own("hexarotor", places)
+    return own("hexarotor", rotor_places)
 
 
 def tilted_hexarotor():
     """Rotors that lean 20 degrees to one side and the other in turn, at two heights."""
     lean = math.radians(20.0)
-    places = [
+    rotor_places = [
         {
             "position_m": (0.3 * math.cos(a), 0.3 * math.sin(a), 0.05 + 0.03 * (k % 2)),
             "direction": "ccw" if k % 2 else "cw",
@@ -60,18 +60,18 @@ def tilted_hexarotor():
         }
         for k, a in enumerate(around(6))
     ]
-    return own("tilted_hexarotor", places)
+    return own("tilted_hexarotor", rotor_places)
 
 
 def octo_x8():
     """Four arms, on each an upper and a lower rotor that turn against each other."""
-    places = []
+    rotor_places = []
     for k, a in enumerate(around(4)):
         x, y = 0.28 * math.cos(a), 0.28 * math.sin(a)
         for z, upper in ((0.06, True), (-0.02, False)):
             left = upper == bool(k % 2)
-            places.append({"position_m": (x, y, z), "direction": "ccw" if left else "cw"})
-    return own("octo_x8", places, thrust_n_s2=5.0e-6)
+            rotor_places.append({"position_m": (x, y, z), "direction": "ccw" if left else "cw"})
+    return own("octo_x8", rotor_places, thrust_n_s2=5.0e-6)
 
 
 VEHICLES = {name: load_airframe(name) for name in airframe_names()}
@@ -89,14 +89,14 @@ def on_ground(airframe, count=1):
     )
 
 
-def reach(airframe):
-    """A height and a way that take some seconds at the vehicle's own speeds."""
+def height_and_distance(airframe):
+    """A height and a distance, m, that take some seconds at the vehicle's own speeds."""
     return 3.0 * airframe.limits.take_off_m_s, 4.0 * airframe.limits.speed_m_s**0.5
 
 
 @every_airframe
-def test_takes_off_flies_to_a_place_comes_back_and_lands(airframe):
-    height, way = reach(airframe)
+def test_takes_off_flies_to_a_position_comes_back_and_lands(airframe):
+    height, distance = height_and_distance(airframe)
     fleet = on_ground(airframe)
     start = fleet.state.position_map[0].copy()
     fleet.advance(500, FLAT.grid)
@@ -108,7 +108,7 @@ def test_takes_off_flies_to_a_place_comes_back_and_lands(airframe):
     above = start + np.array([0, 0, height])
     np.testing.assert_allclose(fleet.state.position_map[0], above, atol=0.05)
 
-    goal = above + np.array([way, 0.5 * way, 0])
+    goal = above + np.array([distance, 0.5 * distance, 0])
     fleet.command_position(0, goal, yaw=-1.0)
     fleet.advance(14_000, FLAT.grid)
     assert fleet.mode(0) is FlightMode.HOLD

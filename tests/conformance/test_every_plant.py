@@ -18,22 +18,24 @@ PLANTS = {
     "kinematic": Kinematic(),
     "kinematic, lagging": Kinematic(time_constant_s=0.3, limited=True),
 }
-WAY = np.array([3.0, 1.0, 1.0])
+OFFSET = np.array([3.0, 1.0, 1.0])
 every_plant = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
 
 
 def fleet_of(*plants):
     f450, count = load_airframe("f450"), len(plants)
-    place = np.column_stack([10.0 * np.arange(count), np.zeros(count), np.full(count, 10.0)])
+    positions = np.column_stack([10.0 * np.arange(count), np.zeros(count), np.full(count, 10.0)])
     attitude = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    return Fleet([f450] * count, place, attitude, plants=plants, weather=Weather((1.0, 0.5, 0.0)))
+    return Fleet(
+        [f450] * count, positions, attitude, plants=plants, weather=Weather((1.0, 0.5, 0.0))
+    )
 
 
 def task(fleet, row=0):
-    """Somewhere else by velocity, then to a place, then down."""
+    """Flies by velocity, then to a position, then down."""
     at = fleet.state.position_map[row].copy()
     yield 400, lambda: fleet.command_velocity_body(row, [1.0, 0.5, 0.2], 0.4)
-    yield 5000, lambda: fleet.command_position(row, at + WAY, 0.5)
+    yield 5000, lambda: fleet.command_position(row, at + OFFSET, 0.5)
     yield 400, lambda: fleet.hold(row)
 
 
@@ -60,7 +62,7 @@ def test_does_its_task(plant):
     start = fleet.state.position_map[0].copy()
     flown(fleet)
     fleet.advance(2000, FLAT)
-    np.testing.assert_allclose(fleet.state.position_map[0], start + WAY, atol=0.15)
+    np.testing.assert_allclose(fleet.state.position_map[0], start + OFFSET, atol=0.15)
     assert np.linalg.norm(fleet.state.velocity_map[0]) < 0.05
     np.testing.assert_allclose(np.linalg.norm(fleet.state.attitude[0]), 1.0, atol=1e-9)
 

@@ -66,7 +66,7 @@ every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.kind)
 
 
 def scenario(kind, *, uavs=1, seed=1, **changes):
-    """UAVs at rest on level ground beyond each other's reach, each with the sensor alone."""
+    """UAVs at rest on level ground beyond each other's range, each with the sensor alone."""
     entry = {"kind": kind.kind, **kind.entry, **changes}
     return {
         "name": "conformance",
@@ -110,7 +110,7 @@ def differs(samples, others, rows=slice(None)):
 
 
 class Measuring:
-    """A bank over a fleet at rest, asked for its measurements one after the other."""
+    """A bank over a fleet at rest, sampled row by row."""
 
     def __init__(self, simulate, data):
         self.simulation = simulate(data)
@@ -144,7 +144,7 @@ def test_rate_and_phase(simulate, kind):
 
 
 @every_kind
-def test_same_seed_same_bytes_however_sliced_and_whoever_else_flies(simulate, kind):
+def test_same_seed_same_bytes_however_sliced_and_whatever_else_flies(simulate, kind):
     alone = as_bytes(record(simulate(scenario(kind)), kind))
     assert alone
     assert as_bytes(record(simulate(scenario(kind)), kind, slices=(1, 7, 33))) == alone

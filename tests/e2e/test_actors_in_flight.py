@@ -18,8 +18,8 @@ from volery.world.materials import Material
 SCAN = "/uav1/laser/horizontal/scan"
 
 
-def outside(name="van", shape="car", place=(6.0, 0.0), yaw_deg=0.0):
-    motion = {"kind": "external", "position_m": list(place), "yaw_deg": yaw_deg}
+def outside(name="van", shape="car", position=(6.0, 0.0), yaw_deg=0.0):
+    motion = {"kind": "external", "position_m": list(position), "yaw_deg": yaw_deg}
     return {"name": name, "shape": shape, "motion": motion}
 
 
@@ -136,13 +136,13 @@ def test_what_drives_into_a_hovering_uav_hits_it(simulate, actors_data):
     first = hits[0]
     radius = simulation.uavs["uav1"].airframe.body.collision_radius_m
     assert (first.uav, first.partner) == ("uav1", "truck")
-    # Its front reaches the UAV's sphere at 12 m - 2.2 m - radius of its way.
+    # Its front reaches the UAV's sphere at 12 m - 2.2 m - radius of its path.
     assert first.time_ns * 1e-9 == pytest.approx((12.0 - 2.2 - radius) / 10.0, abs=0.02)
     assert first.speed_m_s == pytest.approx(10.0, abs=0.2)
     assert simulation.uavs["uav1"].position_map[0] > 1.0  # thrown ahead
 
 
-def test_who_flies_into_a_actor_crashes(simulate, actors_data):
+def test_a_uav_that_flies_into_an_actor_crashes(simulate, actors_data):
     actors_data["physics"] = {"on_contact": "crash"}
     actors_data["types"]["f450"]["plant"] = "rigid_body"
     simulation = simulate(actors_data)
@@ -170,7 +170,7 @@ def test_a_bird_that_passes_near_by_is_no_contact(simulate, actors_data):
 
 
 def busy(data):
-    """Three UAVs among things of all kinds, which meet now and then."""
+    """Three UAVs among actors of all kinds, which collide now and then."""
     data["physics"] = {"on_contact": "bounce"}
     data["types"]["f450"]["sensors"] = data["types"]["f450"]["sensors"][:3]
     data["uavs"] = [
@@ -186,7 +186,7 @@ def busy(data):
     data["world"]["actors"] = [
         {"name": "anna", "shape": "person", "motion": {**walk, "at_end": "back"}},
         {"name": "gull", "shape": "bird", "motion": fly},
-        outside(place=(3.0, 0.0)),
+        outside(position=(3.0, 0.0)),
     ]
     return data
 
@@ -304,7 +304,7 @@ def test_they_are_put_by_the_standard(simulate, actors_data):
     assert "finite" in call(simulation, "/set_entity_state", **both).result.error_message
 
 
-def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
+def test_a_topic_sets_their_poses_and_tf_publishes_them(simulate, actors_data):
     simulation = simulate(actors_data)
     transforms = listen(simulation, "/tf")
     sender = simulation.graph.advertise("/actors/van/pose", PoseStamped)
@@ -321,10 +321,10 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
     assert send(12.0, (5.0, 0.0, 0.0, 0.0))[0] == 11.0
     assert send(float("nan"))[0] == 11.0
     assert send(13.0, frame="odom")[0] == 11.0
-    told = [t for message in transforms for t in message.transforms if t.child_frame_id == "van"]
-    assert len(told) >= 25
-    assert told[-1].header.frame_id == "map"
-    assert told[-1].transform.translation.x == 11.0
+    poses = [t for message in transforms for t in message.transforms if t.child_frame_id == "van"]
+    assert len(poses) >= 25
+    assert poses[-1].header.frame_id == "map"
+    assert poses[-1].transform.translation.x == 11.0
 
 
 @pytest.mark.parametrize(
@@ -333,7 +333,7 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
         ([outside("uav7")], "UAV's name"),
         ([outside(), outside()], "used twice: van"),
         ([{**outside(), "shape": "boat"}], "person"),
-        ([outside(place=(1.0,))], "position_m"),
+        ([outside(position=(1.0,))], "position_m"),
         (
             [
                 {

@@ -1,4 +1,4 @@
-"""Avoidance by depth camera: past one block, two ways; and the numbers of a bench."""
+"""Avoidance by depth camera: past one block, by two methods; and the numbers of a bench."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from volery.control.flight_modes import FlightMode
 from volery.scenario.load import load_scenario
-from volery_benchmarks.avoidance import FIELDS, WAYS, Flight, field_scenario, figures_of
+from volery_benchmarks.avoidance import FIELDS, METHODS, Flight, field_scenario, figures_of
 
 COURSE_M = 32.0
 
@@ -17,7 +17,7 @@ COURSE_M = 32.0
 def past_a_block(tmp_path):
     """A course with a block of 2 m in its first half."""
 
-    def scenario(way):
+    def scenario(method):
         data = load_scenario("obstacle_field").model_dump()
         (tmp_path / "block.csv").write_text("1\n")
         data["world"]["forest"] = None
@@ -27,9 +27,9 @@ def past_a_block(tmp_path):
             "origin_m": [11.0, -1.3],
         }
         node = data["types"]["scout"]["nodes"][0]
-        node["node"] = WAYS[way]
+        node["node"] = METHODS[method]
         node["parameters"]["distance_m"] = COURSE_M
-        if way == "region":
+        if method == "region":
             node["parameters"] |= {"threshold": 0.6, "region": [0.5, 0.4]}
         data["duration_s"] = 120.0
         return data
@@ -64,7 +64,7 @@ def test_the_machine_goes_through_its_states(simulate, past_a_block):
     assert flown[-1] == "land"
 
 
-def test_the_whole_picture_leads_around(simulate, past_a_block):
+def test_the_whole_image_leads_around(simulate, past_a_block):
     simulation, phases = fly(simulate, past_a_block("whole"))
     assert phases == ["climb", "fly", "land"]
     assert simulation.time_s < 40.0

@@ -23,12 +23,12 @@ def test_three_uavs_set_out_through_the_streets():
         for uav in simulation.uavs.values():
             assert not uav.crashed
             assert uav.position_map[2] - 5.0 == pytest.approx(4.0, abs=0.8)
-        places = np.array([uav.position_map for uav in simulation.uavs.values()])
-        flown = np.linalg.norm(places - np.array(list(start.values())), axis=1)
+        positions = np.array([uav.position_map for uav in simulation.uavs.values()])
+        flown = np.linalg.norm(positions - np.array(list(start.values())), axis=1)
         assert flown.min() > 5.0
         assert flown.max() < 60.0
         assert (
-            simulation.world.scene.clearance(places, 50.0, include_terrain=False).distance.min()
+            simulation.world.scene.clearance(positions, 50.0, include_terrain=False).distance.min()
             > 0.8
         )
 
@@ -74,7 +74,7 @@ def test_errors_of_a_city_name_scenario_and_key(simulate, flat_data, tmp_path):
 
 
 def _grove():
-    """Central Helsinki, whose streets have trees, of a species that nobody knows."""
+    """Central Helsinki, whose streets have trees of an unknown species."""
     return {
         "world": {
             "terrain": {"kind": "flat", "extent_m": 900.0},

@@ -20,7 +20,7 @@ from volery.scenario import overrides
 from volery.runtime.warmup.requirements import needs_of
 from volery.runtime.warmup.tasks import do
 
-watch, told = NeedsWatch(), {}
+watch, received = NeedsWatch(), {}
 scenario = load_scenario(sys.argv[1])
 if sys.argv[1] == "forest_search":  # two use all kernels of a team
     scenario = overrides.apply(scenario, uavs=2)
@@ -30,10 +30,10 @@ with Simulation(scenario) as simulation:
     before = len(watch.needed)
     for uav in simulation.vehicles.names:
         for name in ("slam/status", "planning/goal_status"):
-            note = lambda p: told.update({p.topic: p.message.data})
+            note = lambda p: received.update({p.topic: p.message.data})
             simulation.graph.subscribe(f"/{uav}/{name}", note, String)
     simulation.run(float(sys.argv[2]))
-print(json.dumps([before, watch.needed[before:], told]))
+print(json.dumps([before, watch.needed[before:], received]))
 """
 _PARTS = {f"volery.core.rng.{name} (uint64, int64)" for name in ("normal", "uniform")}
 """Parts of other kernels that Python calls, too: compiled with those, loaded when called."""
@@ -42,22 +42,22 @@ _REASON = "a `warmup_tasks` of a node, or `runtime.warmup`, lacks what compiles 
 
 @pytest.mark.slow
 def test_nothing_is_compiled_in_flight() -> None:
-    """The search flies until places were seen again and ways planned anew."""
+    """The search flies until it has closed loops and planned new paths."""
     flights = (("forest_search", 70), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
-    told: dict[str, dict[str, str]] = {}
+    received: dict[str, dict[str, str]] = {}
     for scenario, seconds in flights:
         printed = _run("-c", _FLY, scenario, str(seconds))
-        before, in_flight, told[scenario] = json.loads(printed.splitlines()[-1])
+        before, in_flight, received[scenario] = json.loads(printed.splitlines()[-1])
         assert {*in_flight} <= _PARTS, f"{scenario}: {_REASON}"
         assert before > 50 or scenario != "forest_search"
-    states = {topic: json.loads(text) for topic, text in told["forest_search"].items()}
+    states = {topic: json.loads(text) for topic, text in received["forest_search"].items()}
     assert sum(s["closures"] for t, s in states.items() if t.endswith("/slam/status")) > 0
     assert max(s["plans"] for t, s in states.items() if t.endswith("/goal_status")) > 3
 
 
 @pytest.mark.slow
 def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
-    """Motion and places lost and found, many divisions of maps: what unit tests have nodes do."""
+    """Tracking lost and restored, many divisions of maps: what unit tests have nodes do."""
     needed = tmp_path / "needed.json"
     folder = _TESTS / "unit" / "autonomy"
     names = (

@@ -16,7 +16,7 @@ CELL_M = 4.0
 
 
 class Watch:
-    """What the planner tells, and where the UAVs really were."""
+    """What the planner publishes, and where the UAVs really were."""
 
     def __init__(self, simulation):
         self.simulation = simulation
@@ -44,9 +44,9 @@ class Watch:
 
     def flown_cells(self, shape):
         """Sub-cells that some UAV was in, in the air."""
-        places = np.vstack([np.array(track) for track in self.tracks.values()])
-        places = places[places[:, 2] > 1.5]
-        columns, rows = np.floor(places[:, :2] / (CELL_M / 2.0)).astype(int).T
+        positions = np.vstack([np.array(track) for track in self.tracks.values()])
+        positions = positions[positions[:, 2] > 1.5]
+        columns, rows = np.floor(positions[:, :2] / (CELL_M / 2.0)).astype(int).T
         seen = np.zeros((2 * shape[0], 2 * shape[1]), bool)
         seen[rows, columns] = True
         return seen
@@ -103,7 +103,7 @@ def test_the_others_share_what_a_lost_uav_leaves(tmp_path, simulate):
     assert not (watch.areas == 2).any()
 
 
-def test_a_start_outside_the_map_is_told_and_nobody_flies(tmp_path, simulate):
+def test_a_start_outside_the_map_is_reported_and_no_uav_flies(tmp_path, simulate):
     watch = Watch(simulate(field_data(tmp_path, ["000000", "000000"])))
     watch.fly(5.0)
     assert watch.status["state"] == "refused"
@@ -111,7 +111,7 @@ def test_a_start_outside_the_map_is_told_and_nobody_flies(tmp_path, simulate):
     assert all(uav.mode.name == "LANDED" for uav in watch.simulation.uavs.values())
 
 
-def test_cells_beyond_blocks_are_flown_to_or_told_of(tmp_path, simulate):
+def test_cells_beyond_blocks_are_flown_to_or_reported(tmp_path, simulate):
     rows = ["00010", "00010", "00010"]
     for crossing_height_m, missing in ((0.0, 3), (7.0, 0)):
         data = field_data(tmp_path, rows, crossing_height_m=crossing_height_m, uavs=["uav1"])
@@ -123,7 +123,7 @@ def test_cells_beyond_blocks_are_flown_to_or_told_of(tmp_path, simulate):
         assert watch.simulation.clock.finished
 
 
-def test_a_map_that_changes_is_planned_anew(tmp_path, simulate):
+def test_a_map_that_changes_is_replanned(tmp_path, simulate):
     simulation = simulate(field_data(tmp_path))
     watch = Watch(simulation)
     watch.fly(15.0)
@@ -145,10 +145,10 @@ def test_a_flight_goes_on_exactly_from_a_snapshot(tmp_path, simulate, latency_s)
     simulation.run(12.0)
     kept = simulation.snapshot()
     simulation.run(6.0)
-    places = [uav.position_map for uav in simulation.uavs.values()]
+    positions = [uav.position_map for uav in simulation.uavs.values()]
     simulation.restore(kept)
     simulation.run(6.0)
-    np.testing.assert_array_equal(places, [uav.position_map for uav in simulation.uavs.values()])
+    np.testing.assert_array_equal(positions, [uav.position_map for uav in simulation.uavs.values()])
     simulation.reset()
     simulation.run(18.0)
-    np.testing.assert_array_equal(places, [uav.position_map for uav in simulation.uavs.values()])
+    np.testing.assert_array_equal(positions, [uav.position_map for uav in simulation.uavs.values()])

@@ -42,7 +42,7 @@ def test_another_seed_gives_another_run(simulate, flat_data):
     assert digests[0] != digests[1]
 
 
-def test_an_added_uav_changes_nobody_elses_noise(simulate, flat_data):
+def test_an_added_uav_changes_no_other_uavs_noise(simulate, flat_data):
     def imu_of_first(count):
         flat_data["uavs"][0]["count"] = count
         simulation = simulate(flat_data)

@@ -130,9 +130,9 @@ def test_workers_join_from_elsewhere(start, couple):
     listen = ("--workers", 1, "--listen", "127.0.0.1:0")
     leader = start("run", couple, "--trust", *listen, "--digest", "--speed", 3, token="a")
     address = re.search(r"volery worker --join (\S+)", leader.stdout.readline())[1]
-    stranger = start("worker", "--join", address, token="b")
-    assert "the token is wrong" in stranger.communicate(timeout=END_S)[0]
-    assert stranger.returncode == 2
+    intruder = start("worker", "--join", address, token="b")
+    assert "the token is wrong" in intruder.communicate(timeout=END_S)[0]
+    assert intruder.returncode == 2
     assert "was refused: the token is wrong" in leader.stdout.readline()
     worker = start("worker", "--join", address, token="a")
     assert "worker 1 (127.0.0.1) has joined" in leader.stdout.readline()

@@ -46,18 +46,18 @@ def test_a_start_equals_a_uav_that_is_placed_and_pushed(envs, flat_data):
     envs.reset(start=start)
     assert_start(envs, slice(None), start)
     flat_data["uavs"][0]["on_start"] = "wait"
-    with VectorizedSimulation(parse_scenario(flat_data), 4, threads=1) as placed:
-        fleet = placed._blocks[0].fleet
+    with VectorizedSimulation(parse_scenario(flat_data), 4, threads=1) as moved:
+        fleet = moved._blocks[0].fleet
         rows = [np.reshape(value, (8, -1)) for value in vars(start).values()]
         for row in range(8):
             fleet.put(row, rows[0][row], rows[1][row])
             fleet.push(row, rows[2][row], rows[3][row])
-        for each in (envs, placed):
+        for each in (envs, moved):
             each.run(0.3)
             each.command_velocity([1.0, 0.0, 0.0])
             each.run(0.5)
         for name in STATES:
-            found, expected = getattr(envs.state(), name), getattr(placed.state(), name)
+            found, expected = getattr(envs.state(), name), getattr(moved.state(), name)
             np.testing.assert_array_equal(found, expected, err_msg=name)
 
 

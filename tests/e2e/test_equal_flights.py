@@ -67,8 +67,8 @@ def test_waiting_for_a_command_equals_running_for_its_time(simulate, flat_data):
 
     def runs(simulation):
         uav = simulation.uavs["uav1"]
-        ways = (lambda: uav.take_off(2.0), lambda: uav.go_to([2.0, 1.0, 2.5]), uav.hold)
-        for command, time_ns in zip(ways, times, strict=True):
+        commands = (lambda: uav.take_off(2.0), lambda: uav.go_to([2.0, 1.0, 2.5]), uav.hold)
+        for command, time_ns in zip(commands, times, strict=True):
             command()
             simulation.step((time_ns - simulation.time_ns) // 1_000_000)
 

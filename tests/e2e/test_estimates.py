@@ -1,4 +1,4 @@
-"""UAVs that fly on what their own sensors tell them."""
+"""UAVs that fly on estimates from their own sensors."""
 
 import copy
 
@@ -32,8 +32,10 @@ def errors_of(simulation):
 
     def on_odometry(published):
         message = published.message
-        place = message.pose.pose.position
-        error = np.array([place.x, place.y, place.z]) - simulation.uavs["uav1"].position_map
+        position = message.pose.pose.position
+        error = (
+            np.array([position.x, position.y, position.z]) - simulation.uavs["uav1"].position_map
+        )
         sigma = np.sqrt(np.diag(np.reshape(message.pose.covariance, (6, 6)))[:3])
         rows.append((published.time_ns / 1e9, *error, *sigma))
 
@@ -70,7 +72,7 @@ def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_dat
     assert error[:2, (t > 41.0) & (t < 45.0)].max() < 2.5
 
 
-def test_estimates_may_be_told_and_not_flown_on(simulate, estimating_data):
+def test_estimates_may_be_published_and_not_flown_on(simulate, estimating_data):
     estimating_data["types"]["f450"]["sensors"][-1]["used_for_control"] = False
     simulation = simulate(estimating_data)
     rows = errors_of(simulation)
@@ -139,15 +141,15 @@ SLIP_M = 3.0
 
 
 class Slam:
-    """In the place of a SLAM: the truth 25 times a second, 0.1 s late, and slipped aside."""
+    """In place of a SLAM: the truth 25 times a second, 0.1 s late, and slipped aside."""
 
     def __init__(self, simulation):
         self._out = simulation.graph.advertise("/uav1/slam/odom", Odometry)
         self._waiting = []
         self.slip = 0.0
-        simulation.graph.subscribe("/uav1/ground_truth/odom", self._hear)
+        simulation.graph.subscribe("/uav1/ground_truth/odom", self._receive)
 
-    def _hear(self, published):
+    def _receive(self, published):
         message = copy.deepcopy(published.message)
         message.pose.pose.position.y += self.slip
         self._waiting.append(message)
@@ -240,25 +242,25 @@ def test_what_it_took_from_its_slam_is_kept_in_a_snapshot(simulate, slam_data):
 
 
 def odometry_of(simulation):
-    heard = []
-    topic = simulation.graph.subscribe("/uav1/odom", lambda one: heard.append(one.cdr))
+    received = []
+    topic = simulation.graph.subscribe("/uav1/odom", lambda one: received.append(one.cdr))
     simulation.run(0.1)
     topic.cancel()
-    return heard[-1]
+    return received[-1]
 
 
-def test_it_stays_while_it_stands_and_tells_that_no_poses_come(simulate, slam_data):
+def test_it_stays_while_it_stands_and_reports_that_no_poses_come(simulate, slam_data):
     """Without poses the IMU alone would carry the estimate away by hundreds of metres."""
     simulation = simulate(slam_data)
     rows = errors_of(simulation)
     simulation.run(45.0)
     at_start, at_end = np.array(rows[0][1:4]), np.array(rows[-1][1:4])
     assert np.linalg.norm(at_end - at_start) < 0.5
-    told = [
+    warnings = [
         event.describe()
         for event in simulation.diagnostics.events
         if "receives no poses" in event.detail
     ]
-    assert len(told) == 1
-    assert told[0].startswith("5.0")
-    assert "slam/odom" in told[0]
+    assert len(warnings) == 1
+    assert warnings[0].startswith("5.0")
+    assert "slam/odom" in warnings[0]

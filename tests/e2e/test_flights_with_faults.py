@@ -188,12 +188,12 @@ def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
         simulation.step(1)
         found.append(float(health[0, 0]))
     assert found == [0.9, 0.8, 0.8, 1.0, 1.0]
-    told = [e.detail for e in simulation.diagnostics.events if e.kind == "fault"]
-    assert told == ["fault: motor"] * 2 + ["fault over: motor"] * 2
+    details = [e.detail for e in simulation.diagnostics.events if e.kind == "fault"]
+    assert details == ["fault: motor"] * 2 + ["fault over: motor"] * 2
 
 
 @pytest.mark.parametrize("offset", [[0.0, 0.0, -50.0], [1e6, 0.0, 0.0]])
-def test_nobody_is_displaced_out_of_the_world(simulate, airborne, offset):
+def test_no_uav_is_moved_out_of_the_world(simulate, airborne, offset):
     simulation = simulate(airborne)
     with pytest.raises(CommandError, match="would be displaced"):
         simulation.faults.inject({"kind": "displacement", "uav": "uav1", "offset_m": offset})

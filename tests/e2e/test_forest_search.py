@@ -1,4 +1,4 @@
-"""A part of the forest search: two UAVs share it out by radio, and the same happens again."""
+"""A part of the forest search: two UAVs divide it by radio, and a second run is equal."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from volery.scenario import overrides
 from volery.scenario.load import load_scenario
 
 
-def test_no_node_hears_the_truth_nor_another_uav_but_by_radio(
+def test_no_node_receives_ground_truth_or_another_uav_except_by_radio(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """All that nodes of the whole scenario subscribe to or ask services of is their own UAV's."""
+    """All topics and services that nodes of the whole scenario use are their own UAV's."""
     asked: list[tuple[str, str]] = []
 
     def noting(method: Any) -> Any:
@@ -50,7 +50,7 @@ def test_two_share_the_forest_and_repeat_themselves() -> None:
         kept = simulation.snapshot()
         began = [uav.position_map for uav in simulation.uavs.values()]
         simulation.run(4.0)
-        places, digest = (
+        positions, digest = (
             [uav.position_map for uav in simulation.uavs.values()],
             simulation.diagnostics.digest(),
         )
@@ -59,7 +59,7 @@ def test_two_share_the_forest_and_repeat_themselves() -> None:
         assert [str(manager.phase) for manager in managers] == ["search", "search"]
         assert len({manager.member.sector for manager in managers}) == 2
         assert [set(manager.member.team.mates) for manager in managers] == [{"uav2"}, {"uav1"}]
-        for start, end in zip(began, places, strict=True):
+        for start, end in zip(began, positions, strict=True):
             assert np.hypot(*(end - start)[:2]) > 1.5
         contacts = {EventKind.COLLISION, EventKind.IMPACT}
         assert not [event for event in simulation.diagnostics.events if event.kind in contacts]
@@ -69,7 +69,7 @@ def test_two_share_the_forest_and_repeat_themselves() -> None:
             simulation.run(2.0)
         assert simulation.diagnostics.digest() == digest
         again = [uav.position_map for uav in simulation.uavs.values()]
-        np.testing.assert_array_equal(again, places)
+        np.testing.assert_array_equal(again, positions)
 
 
 @pytest.mark.slow
@@ -88,16 +88,16 @@ def test_an_operators_hold_holds_until_resume() -> None:
         assert np.linalg.norm(uav.velocity_map) > 0.5
         assert graph.call("/uav2/task_manager/hold").success
         simulation.run(3.0)
-        place = uav.position_map
+        position = uav.position_map
         simulation.run(3.0)
         assert uav.mode.name == "HOLD"
         assert (str(manager.phase), manager.member.sector) == ("hold", -1)
         assert "held by the operator" in manager.problem
-        assert np.linalg.norm(uav.position_map - place) < 0.3
+        assert np.linalg.norm(uav.position_map - position) < 0.3
         assert graph.call("/uav2/task_manager/resume").success
         simulation.run(5.0)
         assert str(manager.phase) == "search"
-        assert np.linalg.norm(uav.position_map - place) > 1.5
+        assert np.linalg.norm(uav.position_map - position) > 1.5
         assert graph.call("/uav2/task_manager/land").success
         simulation.run(8.0)
         assert (str(manager.phase), manager.member.sector) == ("done", -1)

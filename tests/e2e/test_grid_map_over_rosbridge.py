@@ -78,12 +78,12 @@ def test_a_web_client_builds_the_world(running):
         assert maps[-1]["info"]["origin"]["position"] == {"x": 3.0, "y": -2.0, "z": 0.0}
         until(lambda: ahead(scans[-1]) == pytest.approx(3.0, abs=1e-3))
         service = roslibpy.Service(ros, "/volery/set_grid_map", "volery_interfaces/SetGridMap")
-        answer = service.call(roslibpy.ServiceRequest({"block_height": 0.5}), timeout=60)
-        assert answer["success"]
-        assert "'map_command', 2 x 2 cells of 2 m, blocks 0.5 m high" in answer["message"]
+        response = service.call(roslibpy.ServiceRequest({"block_height": 0.5}), timeout=60)
+        assert response["success"]
+        assert "'map_command', 2 x 2 cells of 2 m, blocks 0.5 m high" in response["message"]
         until(lambda: ahead(scans[-1]) is None or np.isinf(ahead(scans[-1])))
-        answer = service.call(roslibpy.ServiceRequest({"name": "x"}), timeout=60)
-        assert (answer["success"], answer["message"]) == (
+        response = service.call(roslibpy.ServiceRequest({"name": "x"}), timeout=60)
+        assert (response["success"], response["message"]) == (
             False,
             "there is no grid map 'x'; known: map_command",
         )

@@ -1,4 +1,4 @@
-"""The same node files in lock step, in a process's place over rosbridge, and on a played bag."""
+"""The same node files in lock step, in place of a process over rosbridge, and on a played bag."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ NODES = [
         "parameters": {"mount_rpy_deg": [0.0, 30.0, 0.0], "max_sigma_m": 5.0},
     },
 ]
-Said = dict[str, list[tuple[int, bytes]]]
+Published = dict[str, list[tuple[int, bytes]]]
 
 
 def scenario_of(nodes: list[dict[str, Any]], *, blind: bool = False) -> Any:
-    """A UAV before a red cube; a blind one has no sensors, and is told what another one saw."""
+    """A UAV before a red cube; a blind one has no sensors, and receives what another one saw."""
     camera = {
         "kind": "camera",
         "name": "camera",
@@ -72,11 +72,11 @@ def scenario_of(nodes: list[dict[str, Any]], *, blind: bool = False) -> Any:
     )
 
 
-def listen(simulation: Any) -> Said:
+def listen(simulation: Any) -> Published:
     """What the nodes say from now on."""
-    said: Said = {}
+    published: Published = {}
     for name in OUTPUTS:
-        rows = said.setdefault(name, [])
+        rows = published.setdefault(name, [])
         kinds = {
             "team": "volery_interfaces/msg/TeamReport",
             "mission": "volery_interfaces/msg/MissionStatus",
@@ -86,30 +86,30 @@ def listen(simulation: Any) -> Said:
         simulation.graph.subscribe(
             f"/uav1/{name}", lambda p, rows=rows: rows.append((p.time_ns, p.cdr)), kind
         )
-    return said
+    return published
 
 
 @pytest.fixture(name="inside", scope="module")
-def _inside(tmp_path_factory: pytest.TempPathFactory) -> tuple[Said, Path]:
-    """What nodes inside the simulation say, and a log of all that was said."""
+def _inside(tmp_path_factory: pytest.TempPathFactory) -> tuple[Published, Path]:
+    """What nodes inside the simulation publish, and a log of all messages."""
     path = tmp_path_factory.mktemp("profiles") / "flight.mcap"
     with Simulation(scenario_of(NODES)) as simulation, closing(create_log(path)) as log:
-        said = listen(simulation)
+        published = listen(simulation)
         simulation.graph.subscribe_all(log.write)
         simulation.run(SECONDS)
-    return said, path
+    return published, path
 
 
-def test_nodes_inside_see_and_say_something(inside: tuple[Said, Path]) -> None:
-    said, _ = inside
-    assert len(said["team"]) > 40
-    assert said["search_area"]
-    assert said["targets"]
-    assert said["target_detection/targets"]
+def test_nodes_inside_detect_and_publish(inside: tuple[Published, Path]) -> None:
+    published, _ = inside
+    assert len(published["team"]) > 40
+    assert published["search_area"]
+    assert published["targets"]
+    assert published["target_detection/targets"]
 
 
 @pytest.mark.parametrize("outside", [0, 1], ids=["task manager", "target detection"])
-def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside: int) -> None:
+def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Published, Path], outside: int) -> None:
     """One of the nodes, by a profile, while the other stays: between two that are both outside a
     message takes a physics step."""
     own = NODES[outside : outside + 1]
@@ -120,7 +120,7 @@ def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside
         BridgeHost(simulation.gateway) as bridges,
     ):
         bridges.open(server)
-        said = listen(simulation)
+        published = listen(simulation)
         flying, problem = threading.Event(), []
 
         def run_nodes() -> None:
@@ -147,23 +147,23 @@ def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside
         assert not problem
     names = OUTPUTS[:4] if outside == 0 else OUTPUTS[4:]
     for name in names:
-        assert messages(said)[name] == messages(inside[0])[name]
+        assert messages(published)[name] == messages(inside[0])[name]
 
 
-def test_the_same_on_a_played_bag(inside: tuple[Said, Path]) -> None:
+def test_the_same_on_a_played_bag(inside: tuple[Published, Path]) -> None:
     """Nothing is simulated but a UAV that stands still: the nodes live on what the log holds."""
-    said_inside, path = inside
+    published_inside, path = inside
     replay = Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9)
     with Simulation(scenario_of(NODES, blind=True)) as simulation:
-        said = listen(simulation)
+        published = listen(simulation)
         simulation.replay_log(replay)
         simulation.run(SECONDS)
-    assert messages(said) == messages(said_inside)
+    assert messages(published) == messages(published_inside)
 
 
-def messages(said: Said) -> dict[str, list[bytes]]:
+def messages(published: Published) -> dict[str, list[bytes]]:
     """Without the time of delivery."""
-    return {name: [cdr for _, cdr in rows] for name, rows in said.items()}
+    return {name: [cdr for _, cdr in rows] for name, rows in published.items()}
 
 
 # -------------------------------------------------------------------------------- shipped profiles

@@ -89,16 +89,16 @@ def send_area(simulation, corners=AREA):
 
 
 def listen(simulation, topic):
-    heard = []
-    simulation.graph.subscribe(f"/uav1/{topic}", lambda p: heard.append(p.message))
-    return heard
+    received = []
+    simulation.graph.subscribe(f"/uav1/{topic}", lambda p: received.append(p.message))
+    return received
 
 
 def test_a_uav_explores_the_forest_and_its_map_is_that_of_the_trees(simulate):
     simulation = simulate(FOREST)
     simulation.run(6.0)
     send_area(simulation)
-    told = {
+    received = {
         name: listen(simulation, name)
         for name in (
             "planning/status",
@@ -110,19 +110,19 @@ def test_a_uav_explores_the_forest_and_its_map_is_that_of_the_trees(simulate):
     }
     simulation.run(24.0)
     assert [e for e in simulation.diagnostics.events if e.kind is EventKind.IMPACT] == []
-    track = np.array([[m.pose.pose.position.x, m.pose.pose.position.y] for m in told["odom"]])
-    way = np.hypot(*np.diff(track, axis=0).T).sum()
-    assert way > 45.0
-    plans = json.loads(told["planning/status"][-1].data)["plans"]
+    track = np.array([[m.pose.pose.position.x, m.pose.pose.position.y] for m in received["odom"]])
+    length_m = np.hypot(*np.diff(track, axis=0).T).sum()
+    assert length_m > 45.0
+    plans = json.loads(received["planning/status"][-1].data)["plans"]
     assert plans / 24.0 > 5.0
-    state = json.loads(told["exploration/status"][-1].data)
+    state = json.loads(received["exploration/status"][-1].data)
     assert state["state"] == "searching"
     assert state["searched_m2"] > 700.0
-    check_map(told["octomap_binary"][-1], told["projected_map"][-1], track)
+    check_map(received["octomap_binary"][-1], received["projected_map"][-1], track)
 
 
 def check_map(octomap, grid, track):
-    """Trunks beside the way stand in the map where they stand in the forest, and little else."""
+    """Trunks beside the path stand in the map where they stand in the forest, and little else."""
     scenario = parse_scenario(FOREST)
     terrain = build_terrain(scenario)
     forest = build_forest(scenario, terrain)

@@ -1,4 +1,4 @@
-"""The same node inside the simulation and outside of it: the same answers."""
+"""The same node inside the simulation and outside of it: equal results."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def scenario(*, with_node):
 
 
 def listen(simulation):
-    """Commands of the node, and the UAV's way, as they come."""
+    """Commands of the node, and the UAV's trajectory, as they come."""
     commands = []
     simulation.graph.subscribe(
         "/uav1/cmd_vel",
@@ -94,8 +94,8 @@ def over_rosbridge(simulation):
         yield lambda: RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="gap_following")
 
 
-def fly_outside(way):
-    with Simulation(scenario(with_node=False)) as simulation, way(simulation) as open_link:
+def fly_outside(connect):
+    with Simulation(scenario(with_node=False)) as simulation, connect(simulation) as open_link:
         commands = listen(simulation)
         flying, problem = threading.Event(), []
 
@@ -126,22 +126,22 @@ def fly_outside(way):
         return commands, simulation.uavs["uav1"].position_map
 
 
-WAYS = {
+CONNECTIONS = {
     "in memory": in_memory,
     "rosbridge": over_rosbridge,
 }
 
 
-@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-def test_a_lock_step_partner_outside_flies_what_the_node_inside_flies(way):
-    inside, place = fly_inside()
-    outside, other_place = fly_outside(way)
+@pytest.mark.parametrize("connect", CONNECTIONS.values(), ids=CONNECTIONS)
+def test_a_lock_step_partner_outside_flies_what_the_node_inside_flies(connect):
+    inside, position = fly_inside()
+    outside, other_position = fly_outside(connect)
     assert len(inside) > 50
     assert outside == inside
-    assert (place == other_place).all()
+    assert (position == other_position).all()
 
 
-def test_joining_needs_a_way_to_answer():
+def test_joining_needs_a_connection_for_responses():
     with Simulation(scenario(with_node=False)) as simulation:
         session = simulation.gateway.open("mute")
         from volery.graph.messages import message_type
@@ -149,13 +149,13 @@ def test_joining_needs_a_way_to_answer():
 
         kind = message_type("volery_interfaces/srv/JoinLockStep_Request")
         request = kind("mute", 0.001, 1.0, False, False)
-        answers = []
+        responses = []
         session.call(
-            "/volery/join_lock_step", request, ServiceReply(answers.append, answers.append)
+            "/volery/join_lock_step", request, ServiceReply(responses.append, responses.append)
         )
         simulation.step()
-        assert not answers[0].success
-        assert "advertise" in answers[0].message
+        assert not responses[0].success
+        assert "advertise" in responses[0].message
 
 
 def test_a_name_is_taken_once():
@@ -184,7 +184,7 @@ def test_a_name_is_taken_once():
 
 
 @pytest.mark.parametrize("gone", ["closes", "is silent"])
-def test_who_does_not_answer_is_left_behind(gone):
+def test_a_node_that_does_not_respond_is_left_behind(gone):
     with Simulation(scenario(with_node=False)) as simulation:
         session = simulation.gateway.open("lost")
 

@@ -59,14 +59,14 @@ def test_a_log_is_played_to_a_client(flight):
         assert (info.file, info.state, info.position) == ("flight.mcap", 2, 1.0)
         client.close()
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60.0)
-        assert "Stopped with Ctrl-C at 1.000 s" in told
+        _, output = process.communicate(timeout=60.0)
+        assert "Stopped with Ctrl-C at 1.000 s" in output
     finally:
         process.kill()
         process.wait()
 
 
-def test_what_cannot_be_played_is_told_in_a_line(tmp_path):
+def test_a_log_that_cannot_be_played_is_reported_in_a_line(tmp_path):
     path = tmp_path / "nothing.mcap"
     create_log(path).close()
     for words, reason in (

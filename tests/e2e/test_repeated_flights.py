@@ -100,8 +100,8 @@ def resource(uri):
 
 def pose_at(x, y, z, kind="geometry_msgs/msg/PoseStamped"):
     message = zero_message(kind)
-    place = message.pose.position
-    place.x, place.y, place.z = x, y, z
+    position = message.pose.position
+    position.x, position.y, position.z = x, y, z
     message.pose.orientation.w = 1.0
     return message
 
@@ -157,8 +157,8 @@ def disturb(operator, wait):
     wait(1.1)
     operator.fly(0.5, 0.5)
     parameter = {"name": "/uav1/thinker:gain", "value": "0.35"}
-    answer = operator.call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", **parameter)
-    assert answer.successful
+    response = operator.call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", **parameter)
+    assert response.successful
     wait(0.6)
 
 
@@ -173,17 +173,17 @@ from volery.graph.messages import Float32, Imu, Twist
 from volery.graph.nodes.node import Node
 
 class Thinker(Node):
-    """Turns what it hears and measures into a number, after a while."""
+    """Turns what it receives and measures into a number, after a while."""
 
     def __init__(self, **options):
         super().__init__("thinker", **options)
         self.total = 0.0
         self.gain = self.declare_parameter("gain", 0.1, read_only=False)
         self.out = self.create_publisher(Float32, "thought", 5)
-        self.create_subscription(Twist, "cmd_vel", self.hear, 5)
+        self.create_subscription(Twist, "cmd_vel", self.receive, 5)
         self.create_timer(0.05, self.think)
 
-    def hear(self, twist):
+    def receive(self, twist):
         self.total += self.gain.value * twist.linear.x
         self.think()
 
@@ -263,7 +263,7 @@ def repeated(path, again=None, **options):
 
 
 def flown(path):
-    """All that a log tells but for how the run was watched and steered."""
+    """All that a log holds but for how the run was watched and steered."""
     return [
         (r.topic.topic, r.time_ns, r.data)
         for r in LogWalk(path)
@@ -365,16 +365,16 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
         session.publish("/uav1/cmd_vel", Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
         simulation.run(0.5)
         request = message_type("volery_interfaces/srv/StartRecording_Request")("late.mcap", [], [])
-        answers = []
+        responses = []
         session.call(
-            "/volery/start_recording", request, ServiceReply(answers.append, answers.append)
+            "/volery/start_recording", request, ServiceReply(responses.append, responses.append)
         )
         simulation.run(0.5)
-        stopping = ServiceReply(answers.append, answers.append)
+        stopping = ServiceReply(responses.append, responses.append)
         session.call("/volery/stop_recording", None, stopping)
         simulation.run(0.1)
-        assert [answer.success for answer in answers] == [True, True]
-        place = simulation.uavs["uav1"].position_map
+        assert [response.success for response in responses] == [True, True]
+        position = simulation.uavs["uav1"].position_map
     flight = read_flight(tmp_path / "late.mcap")
     assert [c.taken.kind for c in flight.commands] == ["advertise", "publish", "call"]
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
@@ -382,10 +382,10 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
         simulation.run()
         assert simulation.time_s == pytest.approx(1.0, abs=0.02)  # the log knows no more
         simulation.run(1.1 - simulation.time_s)
-        assert (simulation.uavs["uav1"].position_map == place).all()
+        assert (simulation.uavs["uav1"].position_map == position).all()
 
 
-def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
+def test_no_client_changes_a_replayed_flight(tmp_path):
     path = tmp_path / "flight.mcap"
     log = create_log(path)
     with Simulation(parse_scenario(DATA), threads=1) as simulation:
@@ -397,14 +397,14 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.replay_commands(flight)
         session = simulation.gateway.open("visitor")
-        answers = []
+        responses = []
         for service in ("/uav1/land", "/get_entities"):
-            session.call(service, None, ServiceReply(answers.append, answers.append))
+            session.call(service, None, ServiceReply(responses.append, responses.append))
         simulation.run()
         assert simulation.time_s == 0.3
-        assert isinstance(answers[0], GraphError)
-        assert "is repeated" in str(answers[0])
-        assert answers[1].entities == ["uav1", "uav2"]
+        assert isinstance(responses[0], GraphError)
+        assert "is repeated" in str(responses[0])
+        assert responses[1].entities == ["uav1", "uav2"]
         with pytest.raises(CommandError, match="from its start"):
             simulation.replay_commands(flight)
 
@@ -416,7 +416,7 @@ def finish(simulation, log):
     return simulation.diagnostics.digest()
 
 
-def test_a_lock_step_partner_is_met_again(tmp_path):
+def test_the_steps_of_a_lock_step_partner_are_replayed(tmp_path):
     """What it answered, meeting by meeting, and that it left."""
     path = tmp_path / "flight.mcap"
     log = create_log(path)
@@ -434,15 +434,15 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
         request.name, request.period_s, request.timeout_s = "operator", 0.05, 60.0
         joined = []
         session.call("/volery/join_lock_step", request, ServiceReply(joined.append, joined.append))
-        meetings = []
+        steps = []
         chance = random.Random(4)
 
         def steer():
-            while len(meetings) < 12:
+            while len(steps) < 12:
                 come.wait(60.0)
                 come.clear()
                 for published in go.take():
-                    meetings.append(published.message)
+                    steps.append(published.message)
                     stamp = published.message.clock
                     turn = Vector3(0.0, 0.0, 0.7 * chance.random())
                     session.publish("/uav1/cmd_vel", Twist(Vector3(0.5, 0.0, 0.0), turn))
@@ -473,16 +473,16 @@ class Asker(Node):
 
     def on_timer(self):
         if self.ask.service_is_ready():
-            self.ask.call_async().add_done_callback(self.hear)
+            self.ask.call_async().add_done_callback(self.receive)
 
-    def hear(self, answer):
-        number = -1.0 if answer.exception() else float(answer.result().message)
+    def receive(self, future):
+        number = -1.0 if future.exception() else float(future.result().message)
         self.total = 0.5 * self.total + number
         self.out.publish(Float32(self.total))
 """
 
 
-def test_what_a_service_outside_answered_is_answered_again(tmp_path):
+def test_responses_of_an_external_service_are_replayed(tmp_path):
     (tmp_path / "repeated_askers.py").write_text(ASKER)
     path = tmp_path / "flight.mcap"
     log = create_log(path)
@@ -496,16 +496,16 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
         timers = []
         chance = random.Random(5)
 
-        def answer(_request, reply):
-            def tell():
+        def serve(_request, reply):
+            def respond():
                 if chance.random() < 0.2:
                     reply.fail(GraphError("no idea"))
                 reply.answer(response(success=True, message=str(chance.random())))
 
-            timers.append(threading.Timer(0.1 * chance.random(), tell))
+            timers.append(threading.Timer(0.1 * chance.random(), respond))
             timers[-1].start()
 
-        session.create_service("/oracle", "std_srvs/srv/Trigger", answer)
+        session.create_service("/oracle", "std_srvs/srv/Trigger", serve)
         simulation.run(1.2, speed=1.0)
         session.close()  # open requests fail
         simulation.run(0.3, speed=1.0)
@@ -547,5 +547,5 @@ def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
     assert repeated(path) == digest
 
 
-def _ignore(_answer):
-    """The answer does not matter."""
+def _ignore(_response):
+    """The response does not matter."""

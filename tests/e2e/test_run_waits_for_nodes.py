@@ -86,9 +86,9 @@ def fly_with_node_outside():
         try:
             found = (re.match(r"open .*(127\.0\.0\.1:\d+)", line) for line in run.stderr)
             address = next(filter(None, found))[1]
-            way = ["--via", f"rosbridge://{address}", "--namespace", "/uav1"]
+            connection = ["--via", f"rosbridge://{address}", "--namespace", "/uav1"]
             with subprocess.Popen(
-                [*volery, "node", "climbing_node:Climbing", *way, "--lock-step", "0.001"],
+                [*volery, "node", "climbing_node:Climbing", *connection, "--lock-step", "0.001"],
                 stderr=subprocess.DEVNULL,
             ) as node:
                 try:

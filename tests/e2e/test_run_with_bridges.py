@@ -140,8 +140,8 @@ def x_of_uav1(run):
 @pytest.mark.parametrize("via", [via_rosbridge, via_ros2])
 def test_services_are_listed_and_called(run, via):
     assert "/uav1/take_off [std_srvs/srv/Trigger]" in volery(run, "service", "list", "-t", via=via)
-    answer = volery(run, "service", "call", "/get_entities", via=via)
-    assert "entities: [uav1]" in answer
+    response = volery(run, "service", "call", "/get_entities", via=via)
+    assert "entities: [uav1]" in response
     refused = volery(run, "service", "call", "/uav1/take_off", via=via, ok=False)
     assert refused.startswith("error: /uav1/take_off refuses: ")
 
@@ -189,13 +189,13 @@ def test_a_variable_names_the_graph(run):
         ),
     ],
 )
-def test_slips_are_told_in_a_line(run, words, reason):
+def test_wrong_options_are_reported_in_a_line(run, words, reason):
     assert reason in volery(run, *words, ok=False)
 
 
-@pytest.mark.parametrize("way", [via_rosbridge])
-def test_a_node_runs_beside(run, tmp_path, way):
-    name = way.__name__
+@pytest.mark.parametrize("connect", [via_rosbridge])
+def test_a_node_runs_beside(run, tmp_path, connect):
+    name = connect.__name__
     (tmp_path / "echoing.py").write_text(
         "from volery.graph.messages import String\n"
         "from volery.graph.nodes.node import Node\n"
@@ -208,7 +208,7 @@ def test_a_node_runs_beside(run, tmp_path, way):
     )
     profile = tmp_path / "profile.toml"
     profile.write_text(f'namespace = "/uav1"\n[remap]\nout = "/{name}"\n')
-    via = way(run)
+    via = connect(run)
     node = subprocess.Popen(
         [*VOLERY, "node", "echoing:Echo", "--via", via, "--profile", profile, "-p", "word=hello"],
         stderr=subprocess.PIPE,
@@ -242,8 +242,8 @@ def output_of(program, *words, timeout_s):
 @pytest.mark.slow
 def test_the_example_flies_a_square(run):
     volery(run, "service", "call", "/uav1/hold")
-    said = output_of(ROOT / "examples/06_fly_over_rosbridge.py", run.ports[0], 1.5, timeout_s=60)
-    assert 0.8 < float(re.search(r"([\d.]+) m wide", said)[1]) < 2.5
+    output = output_of(ROOT / "examples/06_fly_over_rosbridge.py", run.ports[0], 1.5, timeout_s=60)
+    assert 0.8 < float(re.search(r"([\d.]+) m wide", output)[1]) < 2.5
 
 
 @pytest.mark.slow
@@ -253,11 +253,11 @@ def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(bridge):
     program = ROOT / f"examples/09_bring_your_own_planner{name}.py"
     run = Run(bridge, scenario="plug_in", seconds=300)
     try:
-        said = output_of(program, run.ports[0], 3, timeout_s=200)
+        output = output_of(program, run.ports[0], 3, timeout_s=200)
     finally:
         run.close()
-    assert "map of 32 x 32 cells, 922 free" in said
-    assert said.count("reached row") == 3
+    assert "map of 32 x 32 cells, 922 free" in output
+    assert output.count("reached row") == 3
     assert "import volery" not in program.read_text()
 
 
@@ -265,12 +265,12 @@ def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(bridge):
 def test_a_program_for_mavros_flies_unchanged():
     run = Run("rosbridge", "mavlink-tcp", scenario="plug_in", seconds=300, more=("--uavs", "1"))
     try:
-        said = output_of(ROOT / "examples/13_mavros_offboard.py", run.ports[0], timeout_s=200)
+        output = output_of(ROOT / "examples/13_mavros_offboard.py", run.ports[0], timeout_s=200)
     finally:
         run.close()
-    assert "OFFBOARD, 2.0 m up" in said
-    assert float(re.search(r"([\d.]+) m ahead", said)[1]) == pytest.approx(3.0, abs=0.3)
-    assert "landed and disarmed" in said
+    assert "OFFBOARD, 2.0 m up" in output
+    assert float(re.search(r"([\d.]+) m ahead", output)[1]) == pytest.approx(3.0, abs=0.3)
+    assert "landed and disarmed" in output
 
 
 @pytest.mark.parametrize(
@@ -294,7 +294,7 @@ def test_bridges_that_cannot_be_opened(words, reason):
     assert "Traceback" not in done.stderr
 
 
-def test_a_port_in_use_is_told(run):
+def test_a_port_in_use_is_reported(run):
     done = subprocess.run(
         [*VOLERY, "run", "hover", "--seconds", "1", "--bridge", f"rosbridge={run.ports[0]}"],
         check=False,
@@ -313,9 +313,9 @@ AGAIN_S = 5.0
 """After which a call is repeated that went to a world that was just left."""
 
 
-def answer(client, service, timeout_s=60.0, **fields):
-    place, _, name = service.strip("/").rpartition("/")
-    package = "volery_interfaces" if place == "volery" else "simulation_interfaces"
+def call_service(client, service, timeout_s=60.0, **fields):
+    namespace, _, name = service.strip("/").rpartition("/")
+    package = "volery_interfaces" if namespace == "volery" else "simulation_interfaces"
     srvtype = "".join(word.capitalize() for word in name.split("_"))
     request = zero_message(f"{package}/srv/{srvtype}_Request")
     for name, value in fields.items():
@@ -330,11 +330,11 @@ def world(uri):
 
 
 def test_a_client_loads_another_world():
-    """The answer still comes; the bridges open again where they were, and the client comes back."""
+    """The response still arrives; the bridges reopen their ports, and the client reconnects."""
     run = Run("rosbridge", seconds=600, port=own_port())
     client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
     try:
-        loaded = answer(client, "/load_world", world_resource=world("swarm_100"))
+        loaded = call_service(client, "/load_world", world_resource=world("swarm_100"))
         assert (loaded.result.result, loaded.world.name) == (1, "swarm_100")
         until = time.monotonic() + 600.0
         name = ""
@@ -342,8 +342,8 @@ def test_a_client_loads_another_world():
             assert run.process.poll() is None
             assert time.monotonic() < until
             with suppress(GraphError):
-                name = answer(client, "/get_current_world", AGAIN_S).world.name
-        unknown = answer(client, "/load_world", world_resource=world("atlantis"))
+                name = call_service(client, "/get_current_world", AGAIN_S).world.name
+        unknown = call_service(client, "/load_world", world_resource=world("atlantis"))
         assert unknown.result.result == 2
     finally:
         client.close()
@@ -355,9 +355,9 @@ def test_a_client_loads_a_scenario_with_changes():
     client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
     changes = json.dumps({"uavs": 3, "airframe": "crazyflie", "sensors": ["sonar"], "speed": 2.0})
     try:
-        refused = answer(client, "/volery/load_scenario", scenario="hover", changes="{}x")
+        refused = call_service(client, "/volery/load_scenario", scenario="hover", changes="{}x")
         assert not refused.success
-        loaded = answer(client, "/volery/load_scenario", scenario="hover", changes=changes)
+        loaded = call_service(client, "/volery/load_scenario", scenario="hover", changes=changes)
         assert loaded.success, loaded.message
         until = time.monotonic() + 600.0
         entities = []
@@ -365,8 +365,8 @@ def test_a_client_loads_a_scenario_with_changes():
             assert run.process.poll() is None
             assert time.monotonic() < until
             with suppress(GraphError):
-                entities = answer(client, "/get_entities", AGAIN_S).entities
-        info = answer(client, "/get_entity_info", entity="uav3").info
+                entities = call_service(client, "/get_entities", AGAIN_S).entities
+        info = call_service(client, "/get_entity_info", entity="uav3").info
         assert "crazyflie" in info.description
     finally:
         client.close()
@@ -374,7 +374,7 @@ def test_a_client_loads_a_scenario_with_changes():
 
 
 def test_a_client_unloads_the_world_and_loads_one_again():
-    """In between the bridges are open, the state is NO_WORLD, and little can be asked."""
+    """In between the bridges are open, the state is NO_WORLD, and few services exist."""
     run = Run("rosbridge", seconds=600, port=own_port())
     client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
 
@@ -384,30 +384,32 @@ def test_a_client_unloads_the_world_and_loads_one_again():
             assert run.process.poll() is None
             assert time.monotonic() < until
             with suppress(GraphError):
-                found = answer(client, "/get_simulation_state", AGAIN_S)
+                found = call_service(client, "/get_simulation_state", AGAIN_S)
                 if found.state.state == state:
                     return
 
     try:
-        assert answer(client, "/unload_world").result.result == 1
+        assert call_service(client, "/unload_world").result.result == 1
         come_back(NO_WORLD)
-        assert answer(client, "/get_current_world").result.result == 101
-        assert answer(client, "/unload_world").result.result == 101
-        assert len(answer(client, "/get_available_worlds").worlds) > 3
-        assert UNLOADING in answer(client, "/get_simulator_features").features.features
-        assert answer(client, "/load_world", world_resource=world("atlantis")).result.result == 2
+        assert call_service(client, "/get_current_world").result.result == 101
+        assert call_service(client, "/unload_world").result.result == 101
+        assert len(call_service(client, "/get_available_worlds").worlds) > 3
+        assert UNLOADING in call_service(client, "/get_simulator_features").features.features
+        assert (
+            call_service(client, "/load_world", world_resource=world("atlantis")).result.result == 2
+        )
         with pytest.raises(GraphError, match="has no server"):
-            answer(client, "/get_entities")
-        assert answer(client, "/load_world", world_resource=world("hover")).result.result == 1
+            call_service(client, "/get_entities")
+        assert call_service(client, "/load_world", world_resource=world("hover")).result.result == 1
         come_back(PLAYING)
-        assert answer(client, "/get_current_world").world.name == "hover"
-        assert answer(client, "/unload_world").result.result == 1
+        assert call_service(client, "/get_current_world").world.name == "hover"
+        assert call_service(client, "/unload_world").result.result == 1
         come_back(NO_WORLD)
         quit_it = zero_message("simulation_interfaces/msg/SimulationState")
         quit_it.state = PLAYING
-        assert answer(client, "/set_simulation_state", state=quit_it).result.result == 103
+        assert call_service(client, "/set_simulation_state", state=quit_it).result.result == 103
         quit_it.state = QUITTING
-        assert answer(client, "/set_simulation_state", state=quit_it).result.result == 1
+        assert call_service(client, "/set_simulation_state", state=quit_it).result.result == 1
         assert run.process.wait(60.0) == 0
     finally:
         client.close()

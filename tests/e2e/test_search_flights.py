@@ -72,7 +72,7 @@ def meadow(tmp_path, count, *, with_nodes):
 
 
 class Watch:
-    """What the UAVs tell, and where they really are."""
+    """What the UAVs publish, and where they really are."""
 
     def __init__(self, simulation):
         self.simulation = simulation

@@ -18,7 +18,7 @@ from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
 
 S = 1_000_000_000
-UNDER_WAY_S = 14.0
+IN_FLIGHT_S = 14.0
 FAULT_S = 3.0
 MODERATE_M_S = 1.7
 CONTACTS = {EventKind.COLLISION, EventKind.IMPACT}
@@ -64,8 +64,10 @@ class Relay:
             message = dataclasses.replace(message, header=stamped)
         elif self.spoil == "no numbers":
             pose = message.pose.pose
-            place = dataclasses.replace(pose.position, x=math.nan)
-            pose = dataclasses.replace(message.pose, pose=dataclasses.replace(pose, position=place))
+            position = dataclasses.replace(pose.position, x=math.nan)
+            pose = dataclasses.replace(
+                message.pose, pose=dataclasses.replace(pose, position=position)
+            )
             message = dataclasses.replace(message, pose=pose)
         if self.spoil == "silent" or (self.spoil == "some lost" and self._count % 3):
             return
@@ -75,7 +77,7 @@ class Relay:
 
 
 class Flight:
-    """A UAV that is under way; each test begins there anew."""
+    """A UAV in flight; each test restores that state."""
 
     def __init__(self, folder: str) -> None:
         self.simulation = Simulation(search(1, "relayed/odom", folder))
@@ -84,7 +86,7 @@ class Flight:
         self.simulation.graph.subscribe(
             "/uav1/planning/status", lambda p: self.status.append(json.loads(p.message.data))
         )
-        self.simulation.run(UNDER_WAY_S)
+        self.simulation.run(IN_FLIGHT_S)
         assert self.status[-1]["state"] == "flying"
         self._kept = self.simulation.snapshot()
 
@@ -93,7 +95,7 @@ class Flight:
         self.simulation.restore(self._kept)
         self.status.clear()
 
-    def way_m(self, seconds: float) -> float:
+    def distance_m(self, seconds: float) -> float:
         """How far it comes in some time."""
         uav, before = self.simulation.uavs["uav1"], self.simulation.uavs["uav1"].position_map
         self.simulation.run(seconds)
@@ -101,7 +103,7 @@ class Flight:
 
     def goes_on(self) -> None:
         """All is well again."""
-        assert self.way_m(5.0) > 1.5
+        assert self.distance_m(5.0) > 1.5
         assert self.status[-1]["state"] in ("flying", "turning")
         assert self.status[-1]["problems"] == []
         assert not [e for e in self.simulation.diagnostics.events if e.kind in CONTACTS]
@@ -112,17 +114,17 @@ def _folder(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return tmp_path_factory.mktemp("maps")
 
 
-@pytest.fixture(name="under_way", scope="module")
-def _under_way(folder: Any) -> Any:
+@pytest.fixture(name="flown", scope="module")
+def _flown(folder: Any) -> Any:
     flight = Flight(str(folder))
     yield flight
     flight.simulation.close()
 
 
 @pytest.fixture(name="flight")
-def _flight(under_way: Flight) -> Flight:
-    under_way.begin()
-    return under_way
+def _flight(flown: Flight) -> Flight:
+    flown.begin()
+    return flown
 
 
 @pytest.mark.parametrize(
@@ -149,7 +151,7 @@ def test_it_stops_while_a_sensor_fails(
     flight.simulation.run(FAULT_S - 0.5)
     assert flight.status[-1]["state"] == "holding"
     assert problem in flight.status[-1]["problems"]
-    assert flight.way_m(0.5) < 0.2
+    assert flight.distance_m(0.5) < 0.2
     flight.goes_on()
 
 
@@ -168,7 +170,7 @@ def test_it_stops_while_its_odometry_is_wrong(flight: Flight, spoil: str) -> Non
     flight.simulation.run(FAULT_S - 0.5)
     assert flight.status[-1]["state"] == "holding"
     assert "no odometry" in flight.status[-1]["problems"]
-    assert flight.way_m(0.5) < 0.2
+    assert flight.distance_m(0.5) < 0.2
     flight.relay.spoil = "nothing"
     flight.goes_on()
 
@@ -179,7 +181,7 @@ def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> No
     flight.simulation.faults.inject({**fault, "at_s": now, "until_s": now + 12.0})
     heights = []
     for _ in range(10):
-        assert flight.way_m(1.0) > 0.1
+        assert flight.distance_m(1.0) > 0.1
         x, y, z = flight.simulation.uavs["uav1"].position_map
         heights.append(z - float(flight.simulation.world.terrain.height(x, y)))
     assert flight.status[-1]["problems"] == ["the sonar repeats itself"]
@@ -190,18 +192,18 @@ def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> No
 
 
 @pytest.mark.slow
-def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight) -> None:
-    simulation, told, poses = flight.simulation, [], []
-    simulation.graph.subscribe("/uav1/slam/status", lambda p: told.append(p.message.data))
+def test_a_kidnapped_uav_holds_relocalizes_and_flies_on(flight: Flight) -> None:
+    simulation, statuses, poses = flight.simulation, [], []
+    simulation.graph.subscribe("/uav1/slam/status", lambda p: statuses.append(p.message.data))
     simulation.graph.subscribe("/uav1/slam/pose", lambda p: poses.append(p.message))
     simulation.faults.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
     simulation.run(20.0)
-    states = [json.loads(text)["state"] for text in told]
+    states = [json.loads(text)["state"] for text in statuses]
     assert "lost" in states
     assert states[-1] == "tracking"
-    assert json.loads(told[-1])["closures"] >= 1
-    place = poses[-1].pose.pose.position
-    found = np.array([place.x, place.y, place.z]) - simulation.uavs["uav1"].position_map
+    assert json.loads(statuses[-1])["closures"] >= 1
+    position = poses[-1].pose.pose.position
+    found = np.array([position.x, position.y, position.z]) - simulation.uavs["uav1"].position_map
     assert np.abs(found).max() < 0.5
     flight.goes_on()
 
@@ -210,20 +212,20 @@ def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight
 def test_messages_twice_or_lost_do_not_matter(flight: Flight, spoil: str) -> None:
     flight.relay.spoil = spoil
     flight.goes_on()
-    assert all(not told["problems"] for told in flight.status)
+    assert all(not status["problems"] for status in flight.status)
 
 
 def test_a_map_of_other_cells_is_refused_in_flight(flight: Flight, folder: Any) -> None:
     cells = encode_cells(np.arange(8, dtype=np.int64), np.ones(8, np.bool_))
     write_map(folder / "fine.bt", cells, 0.1)
     request = message_type("volery_interfaces/srv/ByName_Request")
-    answer = flight.simulation.graph.call("/uav1/mapping/load", request("fine.bt"))
-    assert not answer.success
-    assert "cells are 0.1 m wide" in answer.message
+    response = flight.simulation.graph.call("/uav1/mapping/load", request("fine.bt"))
+    assert not response.success
+    assert "cells are 0.1 m wide" in response.message
     flight.goes_on()
 
 
-def test_a_uav_that_is_not_heard_is_named_and_heard_again(simulate_search: Any) -> None:
+def test_a_uav_whose_messages_are_lost_is_named_until_they_return(simulate_search: Any) -> None:
     simulation, problems = simulate_search
     simulation.faults.inject({"kind": "radio", "uav": "uav2", "at_s": 8.0, "until_s": 16.0})
     simulation.run(7.5)

@@ -39,10 +39,10 @@ class Server:
             [*VOLERY, *map(str, words)], stderr=subprocess.PIPE, text=True, cwd=cwd
         )
         self.lines = []
-        self._told = threading.Event()
+        self._has_started = threading.Event()
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
-        assert self._told.wait(120), self.lines
+        assert self._has_started.wait(120), self.lines
         self.url = re.search(r"http://\S+:(\d+)/", "\n".join(self.lines))
         assert self.url, self.lines
         self.port = int(self.url[1])
@@ -51,29 +51,29 @@ class Server:
         for line in self.process.stderr:
             self.lines.append(line.rstrip())
             if line.startswith("page"):
-                self._told.set()
-        self._told.set()
+                self._has_started.set()
+        self._has_started.set()
 
-    def ask(self, path, body=None):
+    def fetch(self, path, body=None):
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", body)
         try:
-            with urllib.request.urlopen(request, timeout=900) as answer:
-                return answer.status, answer.read()
+            with urllib.request.urlopen(request, timeout=900) as response:
+                return response.status, response.read()
         except urllib.error.HTTPError as error:
             with error:
                 return error.code, error.read()
 
     @property
     def status(self):
-        return json.loads(self.ask("/api/status")[1])
+        return json.loads(self.fetch("/api/status")[1])
 
     def wait_for(self, **wanted):
-        self.wait_until(lambda told: wanted.items() <= told.items())
+        self.wait_until(lambda status: wanted.items() <= status.items())
 
     def wait_until(self, good):
         end = time.monotonic() + 600.0
-        while not good(told := self.status):
-            assert time.monotonic() < end, (told, self.lines)
+        while not good(status := self.status):
+            assert time.monotonic() < end, (status, self.lines)
             time.sleep(0.05)
 
     def end(self, how=signal.SIGINT):
@@ -113,8 +113,8 @@ class Ros:
 
     def load(self, name):
         source = {"world_resource": {"uri": name}}
-        answer = self.call("/load_world", "simulation_interfaces/LoadWorld", **source)
-        return answer["result"]
+        response = self.call("/load_world", "simulation_interfaces/LoadWorld", **source)
+        return response["result"]
 
     def first(self, topic, msgtype, good=lambda message: True, seconds=60.0):
         """The first message that is good."""
@@ -133,12 +133,12 @@ class Ros:
 
 
 def test_the_page_and_the_graph_are_at_one_address(server):
-    assert server.ask("/")[0] == 200
+    assert server.fetch("/")[0] == 200
     assert server.status["scenario"] == "hover"
-    assert server.ask("/api/world.glb")[1].startswith(b"glTF")
+    assert server.fetch("/api/world.glb")[1].startswith(b"glTF")
     with Ros(server) as ros:
-        told = ros.first("/uav2/odom", "nav_msgs/Odometry")
-        assert told["child_frame_id"] == "uav2/base_link"
+        odometry = ros.first("/uav2/odom", "nav_msgs/Odometry")
+        assert odometry["child_frame_id"] == "uav2/base_link"
         assert ros.first("/volery/world", "std_msgs/String")["data"] == server.status["world"]
 
 
@@ -152,10 +152,10 @@ def test_another_world_flies_while_the_page_stays(server):
         shown = server.status["world"]
         changed = ros.call("/volery/set_grid_map", "volery_interfaces/SetGridMap", block_height=9.0)
         assert changed["success"]
-        ros.first("/volery/world", "std_msgs/String", lambda told: told["data"] != shown)
+        ros.first("/volery/world", "std_msgs/String", lambda message: message["data"] != shown)
         assert server.status["world"] != shown
         # the file is that of the higher blocks
-        content = server.ask("/api/world.glb")[1]
+        content = server.fetch("/api/world.glb")[1]
         length = int.from_bytes(content[12:16], "little")
         extras = json.loads(content[20 : 20 + length])["asset"]["extras"]
         assert extras["bounds_enu_m"]["max"][2] == 9.0
@@ -163,20 +163,20 @@ def test_another_world_flies_while_the_page_stays(server):
 
 
 def test_an_uploaded_map_is_flown(server):
-    status, told = server.ask("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,1\n0,1,0\n")
-    assert (status, json.loads(told)) == (201, {"scenario": "yard"})
-    assert "yard" in [card["name"] for card in json.loads(server.ask("/api/scenarios")[1])]
+    status, content = server.fetch("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,1\n0,1,0\n")
+    assert (status, json.loads(content)) == (201, {"scenario": "yard"})
+    assert "yard" in [card["name"] for card in json.loads(server.fetch("/api/scenarios")[1])]
     with Ros(server) as ros:
         wanted = {"scenario": "yard", "changes": '{"uavs": 3}'}
-        answer = ros.call("/volery/load_scenario", "volery_interfaces/LoadScenario", **wanted)
-        assert answer["success"], answer
+        response = ros.call("/volery/load_scenario", "volery_interfaces/LoadScenario", **wanted)
+        assert response["success"], response
     server.wait_for(state="flying", scenario="yard")
     with Ros(server) as ros:
-        told = ros.first("/volery/vehicles", "volery_interfaces/VehicleStates")
-        assert [vehicle["name"] for vehicle in told["vehicles"]] == ["uav1", "uav2", "uav3"]
-    status, told = server.ask("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,7\n")
+        content = ros.first("/volery/vehicles", "volery_interfaces/VehicleStates")
+        assert [vehicle["name"] for vehicle in content["vehicles"]] == ["uav1", "uav2", "uav3"]
+    status, content = server.fetch("/api/uploads?kind=grid_map&name=Yard.csv", b"0,0,7\n")
     assert status == 422
-    assert "line 1, column 3" in json.loads(told)["error"]
+    assert "line 1, column 3" in json.loads(content)["error"]
 
 
 def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
@@ -200,7 +200,7 @@ def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
         assert reset["result"]["result"] == 1
         assert ros.load("nowhere")["result"] != 1
         assert ros.load("buried")["result"] == 1
-    server.wait_until(lambda told: told["message"].startswith("buried: "))
+    server.wait_until(lambda status: status["message"].startswith("buried: "))
     server.wait_for(state="ended", scenario="short")
     assert server.status["message"].startswith("buried: ")
     with Ros(server) as ros:

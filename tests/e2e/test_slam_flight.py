@@ -26,7 +26,7 @@ MOUNTS = {"level_mount": [0.0, 0.0, 0.18], "nodding_mount": [0.1, 0.0, -0.08]}
 
 
 def scenario_of(*, blind):
-    """A UAV that takes off among trees; a blind one is told what another one saw."""
+    """A UAV that takes off among trees; a blind one receives what another one saw."""
     kind = FOREST["types"]["surveyor"]
     sensors = [s for s in kind["sensors"] if s["kind"] != "odometry"]
     node = {
@@ -41,40 +41,43 @@ def scenario_of(*, blind):
 
 
 def listen(simulation):
-    said = {}
+    published = {}
     for name in ("odom", "pose"):
-        rows = said.setdefault(name, [])
+        rows = published.setdefault(name, [])
         simulation.graph.subscribe(f"/uav1/slam/{name}", rows.append)
-    return said
+    return published
 
 
-def digest(said):
+def digest(published):
     return {
         name: (len(rows), hashlib.sha256(b"".join(p.cdr for p in rows)).hexdigest())
-        for name, rows in said.items()
+        for name, rows in published.items()
     }
 
 
 def replayed(path):
     with Simulation(scenario_of(blind=True)) as simulation:
-        said = listen(simulation)
+        published = listen(simulation)
         simulation.replay_log(Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9))
         simulation.run(SECONDS)
-    return digest(said)
+    return digest(published)
 
 
 @pytest.mark.slow
 def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp_path):
     path = tmp_path / "flight.mcap"
     with Simulation(scenario_of(blind=False)) as simulation, closing(create_log(path)) as log:
-        said, truth = listen(simulation), []
+        published, truth = listen(simulation), []
         simulation.graph.subscribe("/uav1/ground_truth/odom", truth.append)
         simulation.graph.subscribe_all(log.write)
         simulation.run(1.5)  # it wants half a second of standing still
         simulation.uavs["uav1"].take_off()
         simulation.run(SECONDS - 1.5)
-    assert len(said["odom"]) > 300
-    last, true = said["odom"][-1].message.pose.pose.position, truth[-1].message.pose.pose.position
+    assert len(published["odom"]) > 300
+    last, true = (
+        published["odom"][-1].message.pose.pose.position,
+        truth[-1].message.pose.pose.position,
+    )
     first = truth[0].message.pose.pose.position
     off = np.array([last.x - 60.0 - (true.x - first.x), last.y - 120.0 - (true.y - first.y)])
     assert np.abs(off).max() < 0.2
@@ -90,20 +93,22 @@ def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp
         text=True,
         timeout=900,
     )
-    assert ast.literal_eval(done.stdout.strip().splitlines()[-1]) == digest(said)
-    _maps_alike(path, said["odom"])
+    assert ast.literal_eval(done.stdout.strip().splitlines()[-1]) == digest(published)
+    _maps_alike(path, published["odom"])
 
 
-def _maps_alike(log, told):
-    """What `volery slam` makes of the log alone is the way that was told in flight."""
+def _maps_alike(log, odometry):
+    """What `volery slam` makes of the log alone is the trajectory that was published in flight."""
     options = SlamOptions(start=(60.0, 120.0, 0.0, 0.0))
-    way = OfflineSlam(open_source(log), options).run().trajectory
-    flown = np.array([(stamp_of(p.message), *_place(p.message)) for p in told])
-    there = np.stack([np.interp(way.time_ns, flown[:, 0], flown[:, k]) for k in (1, 2, 3)], 1)
-    assert len(way.time_ns) > 300
-    np.testing.assert_allclose(way.position, there, atol=0.05)
+    trajectory = OfflineSlam(open_source(log), options).run().trajectory
+    flown = np.array([(stamp_of(p.message), *_position(p.message)) for p in odometry])
+    there = np.stack(
+        [np.interp(trajectory.time_ns, flown[:, 0], flown[:, k]) for k in (1, 2, 3)], 1
+    )
+    assert len(trajectory.time_ns) > 300
+    np.testing.assert_allclose(trajectory.position, there, atol=0.05)
 
 
-def _place(message):
+def _position(message):
     p = message.pose.pose.position
     return p.x, p.y, p.z

@@ -12,7 +12,7 @@ from volery.graph.nodes.node import Node
 
 
 class Counting(Node):
-    """Counts in its own way, keeps no state, and publishes from the start."""
+    """Counts its own messages, saves no state, and publishes from the start."""
 
     step = 1
 
@@ -23,14 +23,14 @@ class Counting(Node):
         self.out.publish(String(f"start {self.step}"))
         self.create_subscription(String, "counted", self.on_counted)
         self.create_timer(0.1, self.on_timer)
-        self.heard = []
+        self.received = []
 
     def on_timer(self):
         self.count += self.step
         self.out.publish(String(str(self.count)))
 
     def on_counted(self, message):
-        self.heard.append(message.data)
+        self.received.append(message.data)
 
 
 class CountingTwice(Counting):
@@ -126,7 +126,7 @@ def test_node_that_keeps_no_state_is_named(simulate, flat_data):
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.02])
-def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
+def test_reset_recreates_a_node_without_state(simulate, flat_data, latency_s):
     entry = {"node": f"{__name__}:Counting", "latency_s": latency_s}
     keeping = {"node": "gap_following"}
     twice = {**entry, "node": f"{__name__}:CountingTwice"}
@@ -198,24 +198,24 @@ def test_no_snapshot_in_the_middle_of_a_tick(simulate, flat_data):
 
 def test_undelivered_messages_are_kept(simulate, flat_data):
     simulation = simulate(flat_data)
-    heard = []
+    received = []
     publisher = simulation.graph.advertise("/note", String)
-    simulation.graph.subscribe("/note", lambda published: heard.append(published.message.data))
+    simulation.graph.subscribe("/note", lambda published: received.append(published.message.data))
     publisher.publish(String("waiting"))
     kept = simulation.snapshot()
     simulation.run(0.01)
     simulation.restore(kept)
     simulation.run(0.01)
-    assert heard == ["waiting", "waiting"]
+    assert received == ["waiting", "waiting"]
 
 
-def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
+def test_a_single_uav_is_reset_and_the_other_flies_on(simulate, flat_data):
     flat_data["uavs"] = [
         {"type": "f450", "position_m": [0.0, 0.0]},
         {"type": "f450", "position_m": [5.0, 0.0]},
     ]
 
-    def told(simulation, since_ns):
+    def accelerations_of(simulation, since_ns):
         got = []
         simulation.graph.subscribe(
             "/uav1/imu",
@@ -233,7 +233,7 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
     assert used.uavs["uav1"].crashed
     used.vehicles.reset("uav1")
     assert not used.uavs["uav1"].crashed
-    again, first = told(used, 6_000_000_000), told(fresh, 0)
+    again, first = accelerations_of(used, 6_000_000_000), accelerations_of(fresh, 0)
     for simulation in (used, fresh):
         simulation.uavs["uav1"].take_off(2.0)
         simulation.run(3.0)
@@ -242,7 +242,7 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
     np.testing.assert_array_equal(
         used.uavs["uav2"].position_map, undisturbed.uavs["uav2"].position_map
     )
-    assert again == first[1:]  # the reading of the very start was made before anyone listened
+    assert again == first[1:]  # the first sample was published before the subscription
 
     used.uavs["uav2"].go_to([0.0, 0.0, 0.4])
     used.uavs["uav1"].go_to([-6.0, 0.0, 3.0])
@@ -253,7 +253,7 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
         used.vehicles.reset("uav7")
 
 
-def test_after_a_reset_in_mid_run_the_pace_is_kept():
+def test_after_a_reset_in_mid_run_the_real_time_factor_holds():
     with Simulation(load_scenario("hover"), threads=1) as simulation:
         simulation.run(1.0)
         simulation.post(simulation.reset)

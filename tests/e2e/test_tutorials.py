@@ -29,9 +29,9 @@ def test_tutorial(tutorial, page, tmp_path):
         "volery node": f"volery node --via rosbridge://127.0.0.1:{port}",
     }
     assert tutorial.run(page, tmp_path, ports).strip()
-    picture = ROOT / "docs" / "pictures" / f"{page.stem}.png"
-    assert (tmp_path / picture.name).is_file(), "the picture of the page is made by its code"
-    assert picture.is_file(), "run tools/site/tutorial_pictures.py"
+    image = ROOT / "docs" / "pictures" / f"{page.stem}.png"
+    assert (tmp_path / image.name).is_file(), "the image of the page is made by its code"
+    assert image.is_file(), "run tools/site/tutorial_pictures.py"
 
 
 def test_a_failure_in_a_tutorial_is_reported(tutorial, tmp_path):

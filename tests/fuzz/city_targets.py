@@ -6,12 +6,12 @@ import contextlib
 import json
 
 import numpy as np
-from file_place import path_of
+from scratch_files import path_of
 
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.world.city import build_city
-from volery.world.city.outlines import FARTHEST_M
+from volery.world.city.outlines import MAX_DISTANCE_M
 from volery.world.terrain import Terrain
 
 _LATITUDE, _LONGITUDE = 60.17, 24.94
@@ -89,7 +89,7 @@ def outlines(mutator):
         str(city.report).encode()
         for solid in city.solids:
             assert np.isfinite(solid.mesh.vertices).all()
-            assert np.abs(solid.mesh.vertices).max() < FARTHEST_M
+            assert np.abs(solid.mesh.vertices).max() < MAX_DISTANCE_M
             assert solid.mesh.area > 0.0
             solid.name.encode()
     return 1

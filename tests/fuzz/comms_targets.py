@@ -29,7 +29,7 @@ _TALK = [
     ),
     encode_frame(StationFrameKind.PING, 1, SERVER, 7),
 ]
-_ANSWERS = [
+_RESPONSES = [
     encode_frame(
         StationFrameKind.WELCOME,
         SERVER,
@@ -51,7 +51,7 @@ _ANSWERS = [
     encode_frame(StationFrameKind.PONG, SERVER, 1),
 ]
 _STREAMS = [b"".join((_HELLO, *_TALK[k:], *_TALK[:k])) for k in range(len(_TALK))]
-_BACK = [b"".join((*_ANSWERS[k:], *_ANSWERS[:k])) for k in range(len(_ANSWERS))]
+_BACK = [b"".join((*_RESPONSES[k:], *_RESPONSES[:k])) for k in range(len(_RESPONSES))]
 _FROM_2 = encode_frame(
     StationFrameKind.HELLO,
     2,
@@ -77,14 +77,14 @@ def wire(mutator):
 
 def router(mutator):
     """A server and a station take what they are given, and what they say is whole."""
-    server = Router(RouterSettings(most_corrupt=2), 0, 1)
+    server = Router(RouterSettings(max_corrupt=2), 0, 1)
     one, two = server.connect(0), server.connect(0)
     server.receive(two, _FROM_2, 0)
     for step, piece in enumerate(mutator.cut(mutator.bytes(_STREAMS))):
         server.receive(one, piece, step)
     for connection in (one, two):
-        parser, said = StationFrameParser(), server.take(connection, 1)
-        assert sum(len(frame.data) for frame in parser.feed(said)) == len(said)
+        parser, response = StationFrameParser(), server.take(connection, 1)
+        assert sum(len(frame.data) for frame in parser.feed(response)) == len(response)
         server.disconnect(connection, 2)
     for seconds in range(1, 8):
         server.tick(seconds * 10**9)

@@ -1,7 +1,7 @@
 """Whole logs of a flight after damage: read, played, looked into, mended, taken as a flight.
 
 Pieces of a file are flipped, cut off, doubled, exchanged, and records say another length. Every
-reader of logs gets the file, and a graph on which somebody listens to all of it.
+reader of logs gets the file, and a graph with a subscriber of all topics.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import struct
 from functools import cache
 
 import numpy as np
-from file_place import path_of
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.rosbag2 import Writer as Ros2Writer
+from scratch_files import path_of
 
 from volery.bridges.logs.bag_writer import bag_writer
 from volery.bridges.logs.decoding import LogDecoder
@@ -128,8 +128,8 @@ def damaged_db3(mutator):
     path.write_bytes(_damaged(mutator, _sqlite_bags(), _page_cells))
     with contextlib.suppress(RecordingError):
         source = open_source(path)
-        for heard in source.messages({*source.topics}):
-            assert heard.topic in source.topics
+        for message in source.messages({*source.topics}):
+            assert message.topic in source.topics
     return 1
 
 
@@ -178,14 +178,14 @@ def _damaged(mutator, logs, lengths):
             del data[at : at + piece]
         else:
             position, form = mutator.pick(lengths(data))
-            most = 1 << 8 * struct.calcsize(form)
+            limit = 1 << 8 * struct.calcsize(form)
             (length,) = struct.unpack_from(form, data, position)
             near = (
                 length + random.randrange(-9, 10),
                 random.getrandbits(16),
                 random.getrandbits(63),
             )
-            struct.pack_into(form, data, position, mutator.pick(near) % most)
+            struct.pack_into(form, data, position, mutator.pick(near) % limit)
     return bytes(data)
 
 
@@ -250,8 +250,8 @@ def _play(path):
     with contextlib.closing(Playback(path)) as playback:
         graph = Graph(lambda: playback.now_ns)
         playback.open(graph)
-        heard = []
-        graph.subscribe_all(lambda published: heard.append(published.topic))
+        received = []
+        graph.subscribe_all(lambda published: received.append(published.topic))
         for time_ns in (playback.start_ns, (playback.start_ns + playback.end_ns) // 2):
             playback.seek(time_ns)
             _play_on(playback, graph)

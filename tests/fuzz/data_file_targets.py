@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from file_place import path_of
 from flight_check import refused_or_flown, refused_or_read
+from scratch_files import path_of
 from toml_mutation import changed_text, toml_of, write
 
 import volery

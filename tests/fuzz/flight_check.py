@@ -10,7 +10,7 @@ from volery.core.errors import DivergenceError, VoleryError
 from volery.runtime import Simulation
 
 OUTCOMES = Counter()
-"""How often checks of this process ended in which way."""
+"""How often checks of this process ended with which outcome."""
 _FLOWN_S = 0.3
 _LONGEST_MESSAGE = 20_000
 _LONGEST_LINE = 2000

@@ -15,7 +15,7 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.typestore import typestore
 from volery.runtime.services.grid_maps import grid_of
 from volery.world.grid_maps import block_mesh
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 from volery.world.grid_maps.parsing import parse_cells
 
 OCCUPANCY = "nav_msgs/msg/OccupancyGrid"
@@ -33,7 +33,7 @@ _MAPS = [
 
 
 @cache
-def _pictures():
+def _images():
     grey = (np.indices((5, 7)).sum(axis=0) * 20).astype(np.uint8)
     seeds = []
     for mode in ("L", "1", "P", "RGB", "RGBA", "LA"):
@@ -55,9 +55,9 @@ def moving_ai(mutator):
     return _parse(mutator.bytes(_MAPS), ".map")
 
 
-def picture(mutator):
-    """PNG pictures."""
-    return _parse(mutator.bytes(_pictures()), ".png")
+def image(mutator):
+    """PNG images."""
+    return _parse(mutator.bytes(_images()), ".png")
 
 
 def occupancy(mutator):
@@ -81,5 +81,5 @@ def _parse(data, suffix):
     with contextlib.suppress(DataFileError):
         cells = parse_cells(data, suffix, "x")
         assert cells.ndim == 2
-        assert 0 < cells.size <= MOST_CELLS
+        assert 0 < cells.size <= MAX_CELLS
     return 1

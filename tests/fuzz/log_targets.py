@@ -7,9 +7,9 @@ import struct
 from collections import Counter
 from functools import cache
 
-from file_place import path_of
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
+from scratch_files import path_of
 
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.reader import summarize
@@ -72,9 +72,9 @@ def _bags():
         with writer:
             for name, message in ((STRING, String("hello")), (TWIST, _TWIST)):
                 text, md5 = codec.definition_text(name), codec.md5(name)
-                place = writer.add_connection(f"/{name[-5:]}", name, msgdef=text, md5sum=md5)
+                connection = writer.add_connection(f"/{name[-5:]}", name, msgdef=text, md5sum=md5)
                 for k in range(4):
-                    writer.write(place, k * 10**9, codec.encode(message, name))
+                    writer.write(connection, k * 10**9, codec.encode(message, name))
         found.append(path.read_bytes())
     return found
 

@@ -32,10 +32,10 @@ _HUNG_S = 120.0
 """CPU time of a hundred checks (others may have the processor); of one check that flies:"""
 _FLIGHT_HUNG_S = 20.0
 _SLOW_S = 2.0
-_MOST_GROWTH_MB = 40.0
+_MAX_GROWTH_MB = 40.0
 _FILES = "files"
 """Word for all kinds of files that are loaded or flown."""
-_MOST_MEMORY_BYTES = 3 << 30
+_MAX_MEMORY_BYTES = 3 << 30
 
 
 def random_of(seed, name, number):
@@ -65,10 +65,10 @@ def run(name, seconds, checks, seed):
         number += 1
     signal.setitimer(signal.ITIMER_PROF, 0.0)
     grown, taken_s = _resident_mb() - (settled or 0.0), time.monotonic() - begin
-    well = slowest_s < (_FLIGHT_HUNG_S if flies else _SLOW_S) and grown < _MOST_GROWTH_MB
+    well = slowest_s < (_FLIGHT_HUNG_S if flies else _SLOW_S) and grown < _MAX_GROWTH_MB
     return (
         f"{name}: {frames} frames, {frames / taken_s:.0f}/s, slowest {1000 * slowest_s:.0f} ms, "
-        f"memory {grown:+.1f} MB{_told_outcomes()}{'' if well else ' FAILED'}",
+        f"memory {grown:+.1f} MB{_outcome_summary()}{'' if well else ' FAILED'}",
         well,
     )
 
@@ -77,9 +77,9 @@ def _goes_on(now, begin, seconds, number, checks):
     return number < checks if checks else now < begin + seconds
 
 
-def _told_outcomes():
-    told = ", ".join(f"{count} {what}" for what, count in sorted(OUTCOMES.items()))
-    return f" ({told})" if told else ""
+def _outcome_summary():
+    counts = ", ".join(f"{count} {what}" for what, count in sorted(OUTCOMES.items()))
+    return f" ({counts})" if counts else ""
 
 
 def _resident_mb():
@@ -101,7 +101,7 @@ def main():
     parser.add_argument("--seed", default="0")
     parser.add_argument("--only", type=int, help="this check alone")
     options = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_AS, (_MAX_MEMORY_BYTES, _MAX_MEMORY_BYTES))
     faulthandler.register(signal.SIGPROF, chain=True)  # where it hangs; then the process ends
     well = True
     names = [each for name in options.targets for each in _named(name)]

@@ -60,13 +60,13 @@ def _talk():
 
 
 class _Vehicle:
-    """Takes every order, as long as its numbers are numbers."""
+    """Accepts every command whose numbers are finite."""
 
     def __getattr__(self, name):
-        def obey(*orders):
-            for part in orders:
+        def obey(*commands):
+            for part in commands:
                 for number in part if isinstance(part, tuple) else (part,):
-                    assert number is None or math.isfinite(number), (name, orders)
+                    assert number is None or math.isfinite(number), (name, commands)
             return ""
 
         return obey
@@ -90,7 +90,7 @@ def wire(mutator):
 
 
 def autopilot(mutator):
-    """An autopilot takes whatever is said, and never orders what is no number."""
+    """An autopilot accepts any message, and never commands a number that is not finite."""
     autopilot = Autopilot(1, _Vehicle(), _BUILD)
     modes = ("LANDED", "TAKE_OFF", "HOLD", "GO_TO", "VELOCITY", "LAND", "LOW_LEVEL", "CRASHED")
     height = 0.0

@@ -10,11 +10,11 @@ from functools import cache
 
 import numpy as np
 import trimesh
-from file_place import path_of
 from PIL import Image
+from scratch_files import path_of
 
 from volery.core.errors import DataFileError
-from volery.world.mesh_files import MOST_TRIANGLES, read_mesh
+from volery.world.mesh_files import MAX_TRIANGLES, read_mesh
 
 _GLB_HEAD = struct.Struct("<4sIIII")
 """Magic, version, length of the file; length and name of the first chunk."""
@@ -24,9 +24,9 @@ _GLB_HEAD = struct.Struct("<4sIIII")
 def _box():
     """A box with a texture, and one more that stands turned."""
     box = trimesh.creation.box((1.0, 2.0, 3.0))
-    picture = Image.fromarray((np.indices((4, 4)).sum(axis=0) * 30).astype(np.uint8))
+    image = Image.fromarray((np.indices((4, 4)).sum(axis=0) * 30).astype(np.uint8))
     paint = trimesh.visual.material.PBRMaterial(
-        baseColorFactor=[0.8, 0.1, 0.1, 1.0], baseColorTexture=picture
+        baseColorFactor=[0.8, 0.1, 0.1, 1.0], baseColorTexture=image
     )
     box.visual = trimesh.visual.TextureVisuals(uv=box.vertices[:, :2], material=paint)
     scene = trimesh.Scene()
@@ -121,7 +121,7 @@ def _read(data, name):
     path.write_bytes(data)
     with contextlib.suppress(DataFileError):
         file = read_mesh(path)
-        assert 0 < len(file.triangles) <= MOST_TRIANGLES
+        assert 0 < len(file.triangles) <= MAX_TRIANGLES
         assert np.isfinite(file.mesh.vertices).all()
         moved = np.column_stack([np.eye(3), -file.points.min(axis=0)])  # to the origin
         assert file.placed(moved).area > 0.0

@@ -26,8 +26,8 @@ class Mutator:
     def pick(self, options):
         return options[self.random.randrange(len(options))]
 
-    def chance(self, share):
-        return self.random.random() < share
+    def chance(self, probability):
+        return self.random.random() < probability
 
     def cut(self, data):
         """The same bytes in pieces."""
@@ -38,8 +38,10 @@ class Mutator:
 
     # ------------------------------------------------------------------------------------ bytes
 
-    def noise(self, most):
-        return self.random.getrandbits(8 * most).to_bytes(most)[: self.random.randrange(most + 1)]
+    def noise(self, max_bytes):
+        return self.random.getrandbits(8 * max_bytes).to_bytes(max_bytes)[
+            : self.random.randrange(max_bytes + 1)
+        ]
 
     def bytes(self, seeds):
         """One of the seeds: now and then as it is, mostly changed, rarely nothing but noise."""
@@ -53,48 +55,48 @@ class Mutator:
             self.pick(_EDITS)(self, data, seeds)
         return bytes(data)
 
-    def _place(self, data):
+    def _index(self, data):
         return self.random.randrange(len(data) + 1)
 
     def _flip(self, data, _seeds):
         if data:
-            data[self._place(data) - 1] ^= 1 << self.random.randrange(8)
+            data[self._index(data) - 1] ^= 1 << self.random.randrange(8)
 
     def _set(self, data, _seeds):
         if data:
-            data[self._place(data) - 1] = self.random.randrange(256)
+            data[self._index(data) - 1] = self.random.randrange(256)
 
     def _number(self, data, _seeds):
         form = self.pick(_FORMS)
         size = struct.calcsize(form)
         number = self.pick(_NUMBERS) + self.random.randrange(-1, 2)
-        at = self._place(data)
+        at = self._index(data)
         data[at : at + size] = struct.pack(form, number % (1 << 8 * size))
 
     def _insert(self, data, _seeds):
-        at = self._place(data)
+        at = self._index(data)
         data[at:at] = self.noise(12)
 
     def _remove(self, data, _seeds):
-        at = self._place(data)
+        at = self._index(data)
         del data[at : at + self.random.randrange(1, 12)]
 
     def _repeat(self, data, _seeds):
-        at = self._place(data)
+        at = self._index(data)
         data[at:at] = data[at : at + self.random.randrange(1, 40)] * self.random.randrange(1, 4)
 
     def _splice(self, data, seeds):
         other = self.pick(seeds)
-        at = self._place(data)
-        data[at:] = other[self._place(other) :]
+        at = self._index(data)
+        data[at:] = other[self._index(other) :]
 
     def _truncate(self, data, _seeds):
-        del data[self._place(data) :]
+        del data[self._index(data) :]
 
     # ------------------------------------------------------------------------------ plain values
 
     def plain(self, value, changes=None):
-        """Dicts, lists and scalars like `value`, changed in a few places; `value` stays."""
+        """Dicts, lists and scalars like `value`, changed at a few positions; `value` stays."""
         for _ in range(self.random.randrange(4) if changes is None else changes):
             value = self._changed(value, 0)
         return value

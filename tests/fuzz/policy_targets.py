@@ -10,13 +10,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from file_place import path_of
 from policy_making import chasing_policy, image_policy, small_policy
+from scratch_files import path_of
 
 from volery.autonomy.policy.policy_file import policy_from_bytes, write_policy
 from volery.core.errors import CommandError, DataFileError
 
-_MOST_INPUTS = 100_000
+_MAX_INPUTS = 100_000
 """Observations that the check makes; files may describe larger ones."""
 
 
@@ -71,7 +71,7 @@ def _read(content):
     with contextlib.suppress(DataFileError, CommandError):
         policy = policy_from_bytes(content)
         size = policy.network.input_size
-        if size <= _MOST_INPUTS:
+        if size <= _MAX_INPUTS:
             for value in (0.0, 1.0, -1e30):
                 action = policy.act(np.full(size, value, np.float32))
                 assert np.isfinite(action).all()

@@ -68,7 +68,7 @@ _ARRAYS = {
     "shorts": cbor2.CBORTag(65, b"\0\1\0\2"),
 }
 _BINARIES = [cbor2.dumps(o) for o in (*OPERATIONS, {"op": "publish", "msg": _ARRAYS})]
-_PICTURES = [base64.b64decode(json.loads(encode_png(t.decode()))["data"]) for t in _TEXTS[:6]]
+_IMAGES = [base64.b64decode(json.loads(encode_png(t.decode()))["data"]) for t in _TEXTS[:6]]
 
 
 def json_frames(mutator):
@@ -93,7 +93,7 @@ def cbor_frames(mutator):
 def budgets(mutator):
     """What the count lets pass holds no more than the budgets, which are small here."""
     limits = {"MAX_VALUES": 12, "MAX_MEMBERS": 6, "MAX_CONTAINERS": 5, "MAX_APART": 10**9}
-    limits |= {"_SMALL_BYTES": 0, "_LEAST_RUN": 3, "MAX_TEXT_BYTES": 10**9}
+    limits |= {"_SMALL_BYTES": 0, "_MIN_RUN": 3, "MAX_TEXT_BYTES": 10**9}
     kept = {name: getattr(message_budget, name) for name in limits}
     is_cbor = mutator.chance(0.6)
     data = mutator.bytes((*_BINARIES, *_ARRAYS) if is_cbor else _TEXTS)
@@ -128,19 +128,19 @@ def _held(value):
     return tuple(map(sum, zip(*counts, strict=True)))
 
 
-def _other_pictures():
+def _other_images():
     for mode in ("L", "P", "RGBA", "1", "I;16"):
         file = BytesIO()
         Image.new(mode, (5, 4)).save(file, "png")
         yield file.getvalue()
 
 
-_PICTURES += _other_pictures()
+_IMAGES += _other_images()
 
 
-def pictures(mutator):
+def images(mutator):
     """PNG in base64."""
-    data = base64.b64encode(mutator.bytes(_PICTURES)).decode()
+    data = base64.b64encode(mutator.bytes(_IMAGES)).decode()
     if mutator.chance(0.1):
         data = mutator.bytes([data.encode()]).decode(errors="replace")
     with contextlib.suppress(BridgeError):
@@ -150,7 +150,7 @@ def pictures(mutator):
 
 def fragments(mutator):
     """Fragments in any order: what is kept is bounded, and nothing is counted wrongly."""
-    assembly, most, now_s, whole = Assembly(2000), 0, 0.0, 0
+    assembly, max_kept, now_s, whole = Assembly(2000), 0, 0.0, 0
     steps = mutator.random.randrange(1, 30)
     for _ in range(steps):
         total = mutator.random.randrange(1, 5)
@@ -167,9 +167,9 @@ def fragments(mutator):
         with contextlib.suppress(BridgeError):
             whole += assembly.add(operation, now_s) is not None
         kept = [part for message in assembly._open.values() for part in message.parts.values()]
-        most = max(most, sum(map(len, kept)))
+        max_kept = max(max_kept, sum(map(len, kept)))
         assert sum(message.size for message in assembly._open.values()) == assembly._size
-    assert most <= 2000
+    assert max_kept <= 2000
     assembly.drop_old(now_s + 1000.0)
     assert (assembly.waiting, assembly._size) == (0, 0)
     return steps
@@ -193,7 +193,7 @@ def _frame(mutator, operations):
 
 def server(mutator):
     """Two clients of our server, neither of which may break anything."""
-    bench = Bench(generation=mutator.pick(("ros1", "ros2")), most_bytes=100_000)
+    bench = Bench(generation=mutator.pick(("ros1", "ros2")), max_bytes=100_000)
     api = RosApi(bench.gateway, bench.shared.forms.generation, bench.graph.now_ns)
     api.start()
     first, second = bench.peer("first"), bench.peer("second")
@@ -230,7 +230,7 @@ def _bytes(frame):
     return frame.encode()
 
 
-ANSWERS = (
+RESPONSES = (
     {"op": "publish", "topic": "/out", "msg": {"data": "x"}},
     {"op": "publish", "topic": "/head", "msg": {"stamp": {"sec": 1, "nanosec": 2}}},
     {"op": "service_response", "id": "call_service:/do:1", "values": {"success": True},
@@ -259,13 +259,13 @@ def client(mutator):
     state.subscribe("/out", STRING, 2, False, lambda: None)
     state.subscribe("/head", "std_msgs/msg/Header", 2, False, lambda: None)
     state.advertise("/in", STRING, latched=True)
-    answer = message_type(f"{TRIGGER}_Response")
-    state.create_service("/mine", TRIGGER, lambda _, reply: reply.answer(answer(True, "x")))
+    response_type = message_type(f"{TRIGGER}_Response")
+    state.create_service("/mine", TRIGGER, lambda _, reply: reply.answer(response_type(True, "x")))
     state.call("/do", message_type(f"{TRIGGER}_Request")(), reply())
     state.call("/untyped", None, reply())
     steps = mutator.random.randrange(1, 8)
     for _ in range(steps):
-        state.receive(_frame(mutator, ANSWERS), 1.0)
+        state.receive(_frame(mutator, RESPONSES), 1.0)
         for found in state.frames():
             _bytes(found)
     state.lose("it is over")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 
-from file_place import path_of
 from flight_check import refused_or_flown, refused_or_read
+from scratch_files import path_of
 from toml_mutation import changed_text, write
 
 from volery.bridges.nodes.profile import load_profile

@@ -69,7 +69,7 @@ _STREAMS = [b"".join(_FRAMES[a : a + 3]) + bytes(8) for a in range(len(_FRAMES))
 
 def ros_tcp_wire(mutator):
     """However the stream is damaged and cut: whole frames within the limits, or an error."""
-    parser = ros_tcp.RosTcpFrameParser(most_payload=40_000, most_destination=200)
+    parser = ros_tcp.RosTcpFrameParser(max_payload=40_000, max_destination=200)
     stream = mutator.bytes(_STREAMS)
     if mutator.chance(0.05):
         stream += frame("/big", bytes(30_000))

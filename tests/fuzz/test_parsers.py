@@ -46,7 +46,7 @@ def test_the_same_draws_make_the_same_frames():
     assert value == {"a": [1, 2, {"b": "c"}]}
 
 
-def test_a_long_run_tells_what_it_did():
+def test_a_long_run_reports_what_it_did():
     script = Path(__file__).with_name("long_run.py")
     command = [sys.executable, str(script), "--seconds", "0.2", "type_names"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)

@@ -35,15 +35,15 @@ def write(path, text):
 
 
 def _other_number(mutator, text):
-    places = list(_NUMBER.finditer(text))
-    if not places:
+    matches = list(_NUMBER.finditer(text))
+    if not matches:
         return text
-    place = mutator.pick(places)
+    match = mutator.pick(matches)
     if mutator.chance(0.35):
         number = mutator.pick(_EXTREMES)
     else:
-        number = repr(float(place.group()) * mutator.pick(_FACTORS))
-    return text[: place.start()] + number + text[place.end() :]
+        number = repr(float(match.group()) * mutator.pick(_FACTORS))
+    return text[: match.start()] + number + text[match.end() :]
 
 
 def _other_lines(mutator, text):

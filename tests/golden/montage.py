@@ -1,4 +1,4 @@
-"""All weathers in one picture: `python tests/golden/montage.py docs/pictures/weather.png`."""
+"""All weathers in one image: `python tests/golden/montage.py docs/pictures/weather.png`."""
 
 import sys
 

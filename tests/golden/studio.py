@@ -1,9 +1,9 @@
-"""Pictures of a forest in every weather, and of every other kind of world in some.
+"""Images of a forest in every weather, and of every other kind of world in some.
 
-`python tests/golden/studio.py` stores them anew. With a folder, and if need be a width,
+`python tests/golden/studio.py` stores them. With a folder, and if need be a width,
 it writes large ones there to look at:
 
-    python tests/golden/studio.py pictures 960
+    python tests/golden/studio.py images 960
 """
 
 import sys
@@ -32,7 +32,7 @@ from volery.vehicle.airframe import load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.vehicle.pose_history import new_history
 
-STORED = Path(__file__).parent / "pictures"
+STORED = Path(__file__).parent / "images"
 WEATHERS = {
     "clear": {},
     "rain": {"weather": {"rain_mm_h": 30.0}},
@@ -41,7 +41,7 @@ WEATHERS = {
     "dust": {"weather": {"dust_visibility_m": 60.0}},
     "dusk": {"light": {"hour_of_day": 19.6, "date": "2025-06-21"}},
 }
-"""Keys of [world] for each picture."""
+"""Keys of [world] for each image."""
 _TIME_NS = 2_000_000_000
 
 
@@ -50,12 +50,12 @@ class View:
     """A world ([world] keys) and where it is looked at from."""
 
     world: dict
-    place_m: tuple[float, float, float]
+    position_m: tuple[float, float, float]
     yaw_deg: float
 
 
-def _stands(name, shape, place, yaw_deg=0.0):
-    motion = {"kind": "external", "position_m": place, "yaw_deg": yaw_deg}
+def _stands(name, shape, position, yaw_deg=0.0):
+    motion = {"kind": "external", "position_m": position, "yaw_deg": yaw_deg}
     return {"name": name, "shape": shape, "motion": motion}
 
 
@@ -115,13 +115,13 @@ class Studio:
         self._scene.move_actors(_TIME_NS, _TIME_NS)
 
     def shoot(self, weather, width=160, **options):
-        """The (height, width, 3) picture in one of the `WEATHERS`, and depth if wanted."""
+        """The (height, width, 3) image in one of the `WEATHERS`, and depth if wanted."""
         scenario = self._in(WEATHERS[weather])
         air = build_weather(scenario)
         light = light_of(scenario.world)(air)
         model = CameraModel(width=width, height=width * 3 // 4, horizontal_fov_deg=70.0, samples=4)
         attitude = rotations.from_rpy(0.0, np.radians(-2.0), np.radians(self._view.yaw_deg))
-        history = new_history([self._view.place_m], [attitude], 1_000_000)
+        history = new_history([self._view.position_m], [attitude], 1_000_000)
         mounts = stack_mounts([make_mount()])
         batch = make_batch([0], [0], [_TIME_NS], [0], [0], mounts)
         falling = falling_in(air, light)
@@ -147,7 +147,7 @@ class Studio:
 
 
 def stored(view, weather):
-    """The stored picture (height, width, 3), bytes."""
+    """The stored image (height, width, 3), bytes."""
     pixels = image.imread(STORED / f"{view}_{weather}.png")[..., :3]
     return np.round(255.0 * pixels).astype(np.uint8)
 

@@ -87,8 +87,8 @@ def _with_all(base, word, value):
 
 def _fitting(base_name, value):
     if base_name == "float32":
-        most = float(np.finfo(np.float32).max)
-        return value if np.isnan(value) or np.isinf(value) else float(np.clip(value, -most, most))
+        limit = float(np.finfo(np.float32).max)
+        return value if np.isnan(value) or np.isinf(value) else float(np.clip(value, -limit, limit))
     if "int" in base_name:
         info = np.iinfo(base_name)
         return int(min(max(value, int(info.min)), int(info.max)))

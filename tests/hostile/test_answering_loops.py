@@ -1,4 +1,4 @@
-"""Nodes that answer each other without end, partners that are silent, posts after the end."""
+"""Nodes that trigger each other without end, silent partners, posts after the end."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from volery.graph.nodes.node import Context, Node
 class Echo(Node):
     """Answers what comes on one topic on another one."""
 
-    def __init__(self, name, hears, says, **options):
+    def __init__(self, name, input_topic, output_topic, **options):
         super().__init__(name, **options)
-        self.publisher = self.create_publisher(String, says)
-        self.create_subscription(String, hears, self.publisher.publish)
+        self.publisher = self.create_publisher(String, output_topic)
+        self.create_subscription(String, input_topic, self.publisher.publish)
 
 
 @pytest.fixture
 def start(simulate, flat_data):
     simulation = simulate(flat_data)
 
-    def start(name, hears, says):
+    def start(name, input_topic, output_topic):
         engine = simulation._engine
         context = Context(simulation.graph, engine, lambda: simulation.time_ns)
-        return Echo(name, hears, says, namespace="/uav1", context=context)
+        return Echo(name, input_topic, output_topic, namespace="/uav1", context=context)
 
     start.simulation = simulation
     return start
@@ -106,7 +106,7 @@ class PressedError(Exception):
 
 
 @pytest.mark.timeout(600, func_only=True)
-def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
+def test_ctrl_c_is_handled_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
@@ -119,7 +119,7 @@ def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
 
 
 @pytest.mark.timeout(600, func_only=True)
-def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
+def test_quit_is_handled_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
     simulation.post(simulation.clock.quit)
@@ -128,7 +128,7 @@ def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
 
 
 @pytest.mark.timeout(600, func_only=True)
-def test_quit_in_a_meeting_ends_the_run(simulate, flat_data):
+def test_quit_at_a_barrier_ends_the_run(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
@@ -151,8 +151,8 @@ def test_what_is_posted_after_close_fails(simulate, flat_data):
     for future in (waiting, simulation.post(lambda: 1), client.session.post(lambda: 1)):
         with pytest.raises(CommandError, match="closed"):
             future.result(1.0)
-    answers = []
+    responses = []
     from volery.graph.service_reply import ServiceReply
 
-    client.session.call("/get_entities", None, ServiceReply(answers.append, answers.append))
-    assert "closed" in str(answers[0])
+    client.session.call("/get_entities", None, ServiceReply(responses.append, responses.append))
+    assert "closed" in str(responses[0])

@@ -70,11 +70,11 @@ class Trap:
         return load_scenario(self.file).model_dump(exclude_unset=True)
 
     def log(self) -> Path:
-        """A log beside it that tells of the scenario and of its folder."""
-        told = {"name": "stranger", "seed": 1, "version": "0", "folder": str(self.folder)}
+        """A log beside it with the scenario and its folder."""
+        origin = {"name": "stranger", "seed": 1, "version": "0", "folder": str(self.folder)}
         path = self.folder / "stranger.mcap"
         with closing(create_log(path)) as log:
-            text = json.dumps(told | {"content": self.content})
+            text = json.dumps(origin | {"content": self.content})
             log.write(m.Published("/volery/scenario", "std_msgs/msg/String", 0, m.String(text)))
         return path
 
@@ -107,7 +107,7 @@ def test_a_module_beside_a_scenario_is_not_imported(
         monkeypatch.syspath_prepend(entry[on_path])
     scenario = load_scenario(trap.file)
     assert is_local(trap.module, scenario.access)
-    needs_of(scenario)  # what is compiled before the flight asks nodes, too
+    needs_of(scenario)  # what is compiled before the flight depends on nodes, too
     with pytest.raises(ScenarioError, match="only if you trust it: give --trust"):
         Simulation(scenario, threads=1)
     assert not trap.has_run
@@ -266,16 +266,16 @@ def test_without_a_terminal_code_beside_a_file_is_refused(
     assert not trap.has_run
 
 
-def test_trust_and_no_nodes_are_ways_out(trap: Trap, invoke: Invoke, tmp_path: Path) -> None:
+def test_trust_or_no_nodes_solves_it(trap: Trap, invoke: Invoke, tmp_path: Path) -> None:
     done = invoke("run", trap.file, "--no-nodes")
     assert (done.exit_code, trap.has_run) == (0, False), done.stderr
     done = invoke("run", trap.file, "--trust")
     assert (done.exit_code, trap.has_run) == (0, True), done.stderr
-    assert not (tmp_path / "state").exists()  # remembered is only what was asked for
+    assert not (tmp_path / "state").exists()  # only answers to prompts are stored
 
 
 @pytest.mark.parametrize("flags", [(), ("--trust",)])
-def test_a_strangers_log_starts_no_code(
+def test_a_foreign_log_starts_no_code(
     flags: tuple[str, ...], trap: Trap, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By its name alone, even with `--trust`: that is said of a file, not of a log."""
@@ -287,7 +287,7 @@ def test_a_strangers_log_starts_no_code(
     assert not trap.has_run
 
 
-def test_a_strangers_log_beside_its_scenario_starts_no_code(trap: Trap, invoke: Invoke) -> None:
+def test_a_foreign_log_beside_its_scenario_starts_no_code(trap: Trap, invoke: Invoke) -> None:
     done = invoke("run", trap.file, "--replay-commands", trap.log())
     assert done.exit_code == 2
     assert "give --trust" in done.stderr
@@ -441,11 +441,11 @@ def test_a_terminal_is_asked(trap: Trap, tmp_path: Path) -> None:
         stdin=side, stderr=side, stdout=subprocess.DEVNULL, env=environment, cwd="/",
     ) as process:  # fmt: skip
         os.close(side)
-        said = b""
+        output = b""
         with suppress(OSError):  # at its end
             while piece := os.read(main, 4096):
-                said += piece
+                output += piece
         code = process.wait(250)
     os.close(main)
-    assert b"Trust it from now on?" in said
-    assert (code, trap.has_run) == (0, True), said
+    assert b"Trust it from now on?" in output
+    assert (code, trap.has_run) == (0, True), output

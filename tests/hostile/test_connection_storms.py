@@ -22,7 +22,7 @@ from volery.server.settings import PageSettings
 DESCRIPTORS = 256
 """Of the servers' process: soft limit, and hard limit."""
 STORM = 400
-PATIENCE_S = 600.0
+TIMEOUT_S = 600.0
 SERVERS = """
     import asyncio, json, os, resource, sys, threading
     resource.setrlimit(resource.RLIMIT_NOFILE, ({descriptors}, {descriptors}))
@@ -90,7 +90,7 @@ class Servers:
 
     def close(self):
         self._process.stdin.close()
-        self._process.wait(PATIENCE_S)
+        self._process.wait(TIMEOUT_S)
         self._process.stdout.close()
 
     @property
@@ -108,13 +108,13 @@ def servers(tmp_path):
 
 def status(port):
     with urllib.request.urlopen(
-        f"http://127.0.0.1:{port}/api/status", timeout=PATIENCE_S
-    ) as answer:
-        return json.load(answer)["state"]
+        f"http://127.0.0.1:{port}/api/status", timeout=TIMEOUT_S
+    ) as response:
+        return json.load(response)["state"]
 
 
 def connect(port):
-    return socket.create_connection(("127.0.0.1", port), PATIENCE_S)
+    return socket.create_connection(("127.0.0.1", port), TIMEOUT_S)
 
 
 @contextlib.contextmanager
@@ -151,7 +151,7 @@ def test_half_open_connections_to_every_port_close_none_of_them(servers, words):
             assert client.recv(12) == b"HTTP/1.1 101"
         with connect(servers.ports["ros_tcp"]) as client:
             assert client.recv(4)  # the handshake
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while servers.look() > 0 and time.monotonic() < end:
         time.sleep(0.05)
     assert servers.look() == 0
@@ -165,7 +165,7 @@ def test_established_connections_are_limited_in_all(servers):
     request = b"GET /api/status HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n"
     with storm(servers.ports["page"], request):
         assert servers.look() < DESCRIPTORS
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while status(servers.ports["page"]) != "building" and time.monotonic() < end:
         time.sleep(0.05)
     assert "Traceback" not in servers.errors.read_text()
@@ -183,9 +183,9 @@ def page(tmp_path, monkeypatch):
 
 
 def drip(sock, words=b"X-More: of it\r\n"):
-    """Sends a little now and then until the server ends the connection; what it has said."""
+    """Sends a little now and then until the server ends the connection; what it has sent."""
     sock.settimeout(0.02)
-    said, end = b"", time.monotonic() + PATIENCE_S
+    received, end = b"", time.monotonic() + TIMEOUT_S
     with contextlib.suppress(ConnectionError):
         while time.monotonic() < end:
             sock.sendall(words)
@@ -194,27 +194,27 @@ def drip(sock, words=b"X-More: of it\r\n"):
             except TimeoutError:
                 continue
             if not piece:
-                return said
-            said += piece
+                return received
+            received += piece
     assert time.monotonic() < end
-    return said
+    return received
 
 
 HEAD = b"GET /api/status HTTP/1.1\r\nHost: localhost\r\n"
 
 
 @pytest.mark.parametrize(
-    ("words", "more", "answers"),
+    ("words", "more", "responses"),
     [
         (HEAD, b"X-More: of it\r\n", 0),
         (HEAD + b"\r\n" + HEAD, b"X-More: of it\r\n", 1),  # the second of a connection
-        (HEAD + b"Content-Length: 999999\r\n\r\n", b".", 1),  # a body that nobody reads
+        (HEAD + b"Content-Length: 999999\r\n\r\n", b".", 1),  # a body that the server does not read
     ],
 )
-def test_a_request_that_does_not_come_whole_ends_the_connection(page, words, more, answers):
+def test_a_request_that_does_not_come_whole_ends_the_connection(page, words, more, responses):
     with connect(page.port) as sock:
         sock.sendall(words)
-        assert drip(sock, more).count(b"HTTP/1.1 200") == answers
+        assert drip(sock, more).count(b"HTTP/1.1 200") == responses
 
 
 def test_an_upload_that_stops_is_refused_and_leaves_nothing(page, tmp_path):

@@ -1,4 +1,4 @@
-"""A UAV that one operator holds is out of reach for all others, however its name is spelled."""
+"""A UAV that one operator holds is protected from all others, however its name is spelled."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def operators():
 
 @pytest.fixture
 def bob(operators):
-    crew = OperatorNames()
-    crew.sign_in("Anna")
-    return OperatorPolicy(crew.sign_in("Bob"), crew, operators)
+    names = OperatorNames()
+    names.sign_in("Anna")
+    return OperatorPolicy(names.sign_in("Bob"), names, operators)
 
 
 def call(service, args=None):
@@ -103,14 +103,14 @@ def test_a_field_that_does_not_count_hides_nothing(bob, operation):
         {"op": "publish", "topic": "mavros/setpoint_raw/attitude", "msg": {}},
     ],
 )
-def test_a_name_that_does_not_tell_its_uav_is_out_of_reach_too(operation):
+def test_a_name_that_does_not_contain_its_uav_is_protected_too(operation):
     graph = Graph(lambda: 0)
     node = Node("autopilot", context=Context(graph, None, graph.now_ns), namespace="/uav1")
     Mavros(node, None, "/mavros")
     operators = ControlAuthority(lambda: ["uav1", "uav2"], graph.moved_uavs.of)
-    crew = OperatorNames()
-    anna = OperatorPolicy(crew.sign_in("Anna"), crew, operators)
-    ben = OperatorPolicy(crew.sign_in("Ben"), crew, operators)
+    names = OperatorNames()
+    anna = OperatorPolicy(names.sign_in("Anna"), names, operators)
+    ben = OperatorPolicy(names.sign_in("Ben"), names, operators)
     operators.take("uav2", "Anna")
     assert ben.check(operation)
     operators.take("uav1", "Anna")
@@ -209,13 +209,13 @@ def test_whatever_fault_is_of_a_uav_is_seen_as_about_it(uav, ascii_only):
 def test_one_operator_however_the_name_is_spelled(operators, spelling):
     assert same_operator("Anna", spelling)
     operators.take("uav1", spelling)
-    assert operator_name(operators.holder_of("uav1")).casefold() == "anna"
-    crew = OperatorNames()
-    crew.sign_in("Anna")
-    assert spelling in crew
-    assert crew.sign_in(spelling) not in ("Anna", spelling)
+    assert operator_name(operators.operator_of("uav1")).casefold() == "anna"
+    names = OperatorNames()
+    names.sign_in("Anna")
+    assert spelling in names
+    assert names.sign_in(spelling) not in ("Anna", spelling)
     with pytest.raises(BridgeError, match="another operator"):
-        crew.rename(crew.sign_in("Bob"), spelling)
+        names.rename(names.sign_in("Bob"), spelling)
 
 
 @pytest.mark.parametrize("name", ["Ann", "Anna 2", "An na", "Анна", ""])
@@ -223,18 +223,18 @@ def test_other_operators(name):
     assert not same_operator("Anna", name)
 
 
-def test_nobody_takes_a_name_by_spelling_it_otherwise(bob):
+def test_no_operator_takes_a_name_by_spelling_it_otherwise(bob):
     with pytest.raises(BridgeError, match="another operator"):
         bob.check(call("/volery/take_control", {"uav": "uav2", "operator": "ANNA "}))
     assert bob.name == "Bob"
 
 
-def test_whoever_is_spelled_otherwise_keeps_control(operators):
-    crew = OperatorNames()
-    anna = OperatorPolicy(crew.sign_in("anna"), crew, operators)
+def test_an_operator_spelled_otherwise_keeps_control(operators):
+    names = OperatorNames()
+    anna = OperatorPolicy(names.sign_in("anna"), names, operators)
     assert anna.check(call("/uav1/land"))
     operators.release("uav1", "ANNA")
-    assert operators.holder_of("uav1") == ""
+    assert operators.operator_of("uav1") == ""
 
 
 @given(st.text(max_size=60))

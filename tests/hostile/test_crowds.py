@@ -52,7 +52,7 @@ class Crowd:
         await asyncio.gather(*self.tasks, return_exceptions=True)
         for _ in range(3):
             await asyncio.sleep(0)
-        assert not self.queue.must_wait(REQUESTS)  # what was cancelled blocks nobody
+        assert not self.queue.must_wait(REQUESTS)  # what was cancelled blocks no client
 
 
 def in_loop(scene):
@@ -150,7 +150,7 @@ def test_clients_with_equal_traffic_have_equal_shares_and_none_starves(monkeypat
     in_loop(scene)
 
 
-def test_who_had_costly_frames_waits_until_others_had_as_much(monkeypatch):
+def test_a_client_with_costly_frames_waits_until_others_had_as_much(monkeypatch):
     monkeypatch.setattr(fair_queue, "BUSY_S", 1e9)
 
     async def scene(crowd):
@@ -282,7 +282,7 @@ def test_a_call_does_not_list_all_services(monkeypatch):
         peer.receive(json.dumps({"op": "call_service", "service": "/empty", "args": {}}), 0.0)
         assert session.waiting == 1
         peer.receive(json.dumps({"op": "call_service", "service": "/none", "id": "1"}), 0.0)
-        (answer,) = peer.frames(0.0)
-        assert "has no server" in answer
+        (response,) = peer.frames(0.0)
+        assert "has no server" in response
 
     asyncio.run(run())

@@ -127,7 +127,7 @@ def test_the_second_signal_ends_it_at_once(tmp_path, number):
 
 
 @pytest.mark.slow
-def test_nohup_is_heard(tmp_path):
+def test_nohup_is_respected(tmp_path):
     log = tmp_path / "flight.mcap"
     program = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{FLIES}"
     words = [sys.executable, "-c", program, "run", "hover", "--seconds", "30000", "--record", log]
@@ -169,7 +169,7 @@ def test_a_terminal_that_closes_leaves_log_and_report(tmp_path):
 @pytest.mark.parametrize("number", [TERM, HUP, INT])
 @pytest.mark.parametrize("command", ["serve", "play", "comms", "node"])
 def test_every_command_that_stays_ends_by_a_signal(tmp_path, command, number):
-    """Servers that were asked to end have done what they were for: 0; a node says by what."""
+    """Servers that end by a signal return 0; a node names the signal."""
     log = write(tmp_path / "flight.mcap")
     words, sign = {
         "serve": (["serve", "--port", "0", "--recordings-dir", tmp_path], "flying"),
@@ -177,17 +177,17 @@ def test_every_command_that_stays_ends_by_a_signal(tmp_path, command, number):
         "comms": (["comms", "--port", "0"], "open "),
         "node": (["node", "gap_following", "--via", NOWHERE], ""),
     }[command]
-    said = tmp_path / "said"
-    with said.open("w") as file:
+    output = tmp_path / "said"
+    with output.open("w") as file:
         process = begin([*CLI, *words], stdout=file, stderr=file)
         try:
-            until(lambda: sign in said.read_text() and said.stat().st_size, process)
+            until(lambda: sign in output.read_text() and output.stat().st_size, process)
             process.send_signal(number)
             code = process.wait(timeout=HANG_S)
         finally:
             ended(process)
-    assert code == (128 + number if command == "node" else 0), said.read_text()
-    assert "Traceback" not in said.read_text()
+    assert code == (128 + number if command == "node" else 0), output.read_text()
+    assert "Traceback" not in output.read_text()
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Clients that send more than their share are read from no more until time has paid for it."""
+"""Clients that exceed their CPU budget are not read until it has recovered."""
 
 from __future__ import annotations
 
@@ -110,13 +110,13 @@ def test_a_run_is_behind_when_it_is_late():
 class Flood:
     """A channel whose client sends without a pause; `read` counts what was read of it."""
 
-    def __init__(self, most):
+    def __init__(self, max_reads):
         self.read = 0
-        self._most = most
+        self._max_reads = max_reads
 
     async def recv(self):
         await asyncio.sleep(0)
-        if self.read >= self._most:
+        if self.read >= self._max_reads:
             raise ConnectionResetError
         self.read += 1
         return PUBLISH
@@ -129,7 +129,7 @@ class Flood:
 
 
 def advertised():
-    """A graph that nobody works off, with a topic."""
+    """A graph that no loop processes, with a topic."""
     graph = HandGraph()
     graph.graph.advertise("/cmd", "geometry_msgs/msg/Twist")
     return graph

@@ -1,4 +1,4 @@
-"""What clients ask for never ends the run: it is refused, or logged, and the engine goes on."""
+"""Requests of clients never end the run: it is refused, or logged, and the engine goes on."""
 
 from __future__ import annotations
 
@@ -79,8 +79,10 @@ def test_a_fault_of_a_client_that_becomes_impossible_changes_nothing(client, cap
     np.testing.assert_allclose(client.simulation.uavs["uav1"].position_map, before, atol=0.01)
     assert "stranger" in caplog.text
     assert "displacement" in caplog.text
-    told = [event.detail for event in client.simulation.diagnostics.events if event.kind == "fault"]
-    assert "under the ground" in told[-1]
+    details = [
+        event.detail for event in client.simulation.diagnostics.events if event.kind == "fault"
+    ]
+    assert "under the ground" in details[-1]
 
 
 @pytest.mark.parametrize(
@@ -151,9 +153,9 @@ def test_a_node_that_breaks_later_on_a_clients_value_names_the_client(client):
 
 def test_a_service_that_breaks_names_itself_not_pythons_error(client, caplog):
     client.simulation.graph.create_service("/broken", "std_srvs/srv/Trigger", lambda _: {}["uav2"])
-    answer = client.call("/broken", None)
-    assert "/broken" in str(answer)
-    assert not RAW.search(str(answer))
+    response = client.call("/broken", None)
+    assert "/broken" in str(response)
+    assert not RAW.search(str(response))
     assert "KeyError" in caplog.text
     client.simulation.step(1)
 
@@ -166,7 +168,7 @@ def test_a_publication_that_cannot_be_is_logged_once(client, caplog):
     assert caplog.text.count("/talk' from stranger") == 1
 
 
-def test_releasing_what_nobody_holds_is_refused(client):
+def test_releasing_a_uav_without_operator_is_refused(client):
     request = message_type("volery_interfaces/srv/ReleaseControl_Request")("uav1", "")
     response = client.call("/volery/release_control", request)
     assert not response.success
@@ -210,7 +212,7 @@ BASES = {
     "/rosapi/set_param": {"name": "/uav1/gap_following:height_m", "value": "2.0"},
 }
 LAST = ("delete", "reset", "/kill", "kill")
-"""Services that leave little to ask afterwards."""
+"""Services after which few others exist."""
 
 
 def requests_of(service, srvtype):
@@ -258,9 +260,9 @@ def test_nasty_values_in_every_field_of_every_service(whole):
         for request in requests_of(service, srvtype):
             if not whole.graph.has_service(service):
                 continue
-            answer = client.call(service, request)
-            assert answer is not None or service == "/step_simulation", service
-            assert not RAW.search(str(answer)[:3000]), (service, str(request)[:500])
+            response = client.call(service, request)
+            assert response is not None or service == "/step_simulation", service
+            assert not RAW.search(str(response)[:3000]), (service, str(request)[:500])
             whole.clock.resume()
             whole.step(2)
             asked += 1

@@ -37,9 +37,9 @@ def content(world: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"name": "stranger", "world": world, "types": TYPES, "uavs": UAVS, **more}
 
 
-def foreign_log(path: Path, told: dict[str, Any], folder: str | None = "/") -> Path:
-    """A log that tells of a scenario, and of a folder that is not its own."""
-    origin = {"name": told["name"], "seed": 1, "version": "0", "folder": folder, "content": told}
+def foreign_log(path: Path, data: dict[str, Any], folder: str | None = "/") -> Path:
+    """A log that names a scenario, and a folder that is not its own."""
+    origin = {"name": data["name"], "seed": 1, "version": "0", "folder": folder, "content": data}
     with closing(create_log(path)) as log:
         publish(log, "/volery/scenario", 0, m.String(json.dumps(origin)))
         publish(log, "/clock", 1_000_000_000, m.Clock(m.time_from_ns(1_000_000_000)))
@@ -142,12 +142,12 @@ def test_every_key_that_names_a_file_is_confined(
         "upwards": f"../elsewhere/target.{suffix}",
         "link": f"link.{suffix}",
     }[how]
-    told = content(named(WORLDS.get(kind, {}), file))
+    data = content(named(WORLDS.get(kind, {}), file))
     if kind in MODELS:
-        told["types"] = {"f450": {**TYPES["f450"], **named(MODELS[kind], file)}}
+        data["types"] = {"f450": {**TYPES["f450"], **named(MODELS[kind], file)}}
     if kind == "messages":
-        told["message_packages"] = [str(secret)]
-    scenario = scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own)
+        data["message_packages"] = [str(secret)]
+    scenario = scenario_of(RecordedScenario("stranger", 1, "0", data), folder=own)
     with pytest.raises(VoleryError, match="may be read") as refused:
         Simulation(scenario, threads=1)
     assert SECRET not in str(refused.value)
@@ -159,9 +159,9 @@ def test_the_name_of_a_shipped_model_is_no_path(airframe: str, own: Path, tmp_pa
     shipped = Path(__file__).parents[2] / "src" / "volery" / "vehicle" / "airframes" / "f450.toml"
     (tmp_path / "mine.toml").write_bytes(shipped.read_bytes())
     name = airframe.replace("/DIR", str(tmp_path))
-    told = content({}, types={"f450": {"airframe": name}})
+    data = content({}, types={"f450": {"airframe": name}})
     with pytest.raises(VoleryError, match="no airframe"):
-        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1)
+        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", data), folder=own), threads=1)
 
 
 def test_a_beam_table_lies_beside_its_model(own: Path, secret: Path) -> None:
@@ -175,10 +175,10 @@ def test_a_beam_table_lies_beside_its_model(own: Path, secret: Path) -> None:
     for file in (str(secret / "beams.csv"), "../elsewhere/beams.csv"):
         table = f'[scan]\nkind = "table"\nrate_hz = 10.0\nfile = "{file}"\n'
         (own / "mine.toml").write_text(head + table + tail)
-        told = content({}, types={"f450": {"sensors": [{"kind": "lidar", "model": "mine.toml"}]}})
+        data = content({}, types={"f450": {"sensors": [{"kind": "lidar", "model": "mine.toml"}]}})
         with pytest.raises(VoleryError) as refused:
             Simulation(
-                scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1
+                scenario_of(RecordedScenario("stranger", 1, "0", data), folder=own), threads=1
             )
         assert SECRET not in str(refused.value)
         assert "lies in the folder of its model" in str(refused.value)
@@ -199,22 +199,22 @@ def test_an_upload_reads_below_its_own_folder_only(tmp_path: Path, secret: Path)
         type = "f450"
         position_m = [1.0, 1.0]
     """
-    shelf = ScenarioCatalog(tmp_path / "uploads")
+    catalog = ScenarioCatalog(tmp_path / "uploads")
     for file in (str(secret / "ground.csv"), "../../elsewhere/ground.csv"):
         (folder / "scenario.toml").write_text(toml.format(file=file))
         with pytest.raises(DataFileError, match="may be read"):
-            geometry_of(shelf.load("yard"))
+            geometry_of(catalog.load("yard"))
     (folder / "ground.csv").write_text(GROUND)
     (folder / "scenario.toml").write_text(toml.format(file="ground.csv"))
-    assert geometry_of(shelf.load("yard")).terrain.bounds == (0.0, 0.0, 40.0, 40.0)
+    assert geometry_of(catalog.load("yard")).terrain.bounds == (0.0, 0.0, 40.0, 40.0)
 
 
 def test_ones_own_scenario_keeps_its_names(tmp_path: Path, secret: Path) -> None:
     for file in (str(secret / "ground.csv"), "../elsewhere/ground.csv"):
-        told = content(grid(file))
+        data = content(grid(file))
         folder = tmp_path / "logs"
         folder.mkdir(exist_ok=True)
-        scenario = parse_scenario(told, access=ScenarioAccess(folder))
+        scenario = parse_scenario(data, access=ScenarioAccess(folder))
         assert geometry_of(scenario).terrain.bounds == (0.0, 0.0, 40.0, 40.0)
 
 
@@ -234,19 +234,19 @@ def test_a_log_of_an_upload_finds_its_files(tmp_path: Path) -> None:
     folder = tmp_path / "recordings" / "uploads" / "stranger"
     folder.mkdir(parents=True)
     (folder / "ground.csv").write_text(GROUND)
-    told = content(grid("ground.csv"))
+    data = content(grid("ground.csv"))
     (folder / "scenario.toml").write_text(
         'name = "stranger"\n[world.terrain]\nkind = "grid"\nfile = "ground.csv"\n'
         'spacing_m = 20.0\n[types.f450]\n[[uavs]]\ntype = "f450"\nposition_m = [20.0, 20.0]\n'
     )
-    log = foreign_log(tmp_path / "recordings" / "flight.mcap", told)
-    shelf = ScenarioCatalog(tmp_path / "recordings" / "uploads", tmp_path / "recordings")
-    with LogPlayer(log, shelf=shelf) as player:
+    log = foreign_log(tmp_path / "recordings" / "flight.mcap", data)
+    catalog = ScenarioCatalog(tmp_path / "recordings" / "uploads", tmp_path / "recordings")
+    with LogPlayer(log, catalog=catalog) as player:
         assert player.geometry is not None
 
 
-def test_a_log_does_not_tell_where_files_lie(tmp_path: Path) -> None:
-    """Logs are passed on; folders of one's own machine concern nobody else."""
+def test_a_log_does_not_reveal_where_files_lie(tmp_path: Path) -> None:
+    """Logs are passed on; folders of one's own machine are private."""
     with Simulation(load_scenario("hover"), threads=1) as simulation:
         log = create_log(tmp_path / "flight.mcap")
         simulation.graph.subscribe_all(log.write)
@@ -273,15 +273,15 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
     (own / "linked").symlink_to(secret)
     node = "mapping"
     kind = {"sensors": [], "nodes": [{"node": node, "parameters": {"folder": folder}}]}
-    told = content({}, types={"f450": kind})
+    data = content({}, types={"f450": kind})
     with pytest.raises(ScenarioError, match="only name folders below the working folder"):
-        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1)
+        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", data), folder=own), threads=1)
 
 
 def test_clients_set_no_parameter_that_names_files() -> None:
     node = "mapping"
-    told = content({}, types={"f450": {"sensors": [], "nodes": [{"node": node}]}})
-    with Simulation(parse_scenario(told), threads=1) as simulation:
+    data = content({}, types={"f450": {"sensors": [], "nodes": [{"node": node}]}})
+    with Simulation(parse_scenario(data), threads=1) as simulation:
         parameters = simulation.graph.parameters
         for name in ("folder", "map_file"):
             with pytest.raises(GraphError, match="read-only"):
@@ -292,7 +292,7 @@ def test_clients_set_no_parameter_that_names_files() -> None:
 
 
 @pytest.mark.slow
-def test_a_pilot_reads_no_file_of_the_server(tmp_path: Path, secret: Path) -> None:
+def test_an_operator_reads_no_file_of_the_server(tmp_path: Path, secret: Path) -> None:
     """An uploaded log whose scenario names /etc/passwd, and a table elsewhere, as its ground."""
     pytest.importorskip("roslibpy")
     sys.path.insert(0, str(Path(__file__).parents[1] / "e2e"))
@@ -306,15 +306,15 @@ def test_a_pilot_reads_no_file_of_the_server(tmp_path: Path, secret: Path) -> No
         first_line = Path("/etc/passwd").read_text().splitlines()[0]
         for k, file in enumerate(("/etc/passwd", str(secret / "ground.csv"))):
             log = foreign_log(tmp_path / f"attack{k}.mcap", content(grid(file)))
-            code, told = server.ask(f"/api/recordings?name=attack{k}.mcap", log.read_bytes())
-            assert code == 201, told
+            code, reply = server.fetch(f"/api/recordings?name=attack{k}.mcap", log.read_bytes())
+            assert code == 201, reply
             with Ros(server) as ros:
-                answer = ros.call(
+                response = ros.call(
                     "/volery/play_recording",
                     "volery_interfaces/srv/PlayRecording",
-                    name=json.loads(told)["name"],
+                    name=json.loads(reply)["name"],
                 )
-                assert answer["success"], answer
+                assert response["success"], response
             server.wait_until(
                 lambda status: status["state"] == "flying" and "may be read" in status["message"]
             )

@@ -7,7 +7,7 @@ import socket
 from pathlib import Path
 
 import pytest
-from assignments import ASSIGNMENT, write_assignment, write_pilot
+from assignments import ASSIGNMENT, write_assignment, write_controller
 from typer.testing import CliRunner
 
 from volery.cli.app import app
@@ -77,12 +77,12 @@ def graded(tmp_path, folder, timeout_s=600.0):
 
 
 def test_the_fair_ones_fly_as_alone(tmp_path, folder):
-    write_pilot(folder / "ann.py")
+    write_controller(folder / "ann.py")
     alone = graded(tmp_path, folder)["ann"]
     assert (alone.total, alone.problems) == (4.0, [])
-    write_pilot(folder / "memory.py", MEMORY)
-    write_pilot(folder / "leaves.py", LEAVES)
-    write_pilot(folder / "cheats.py", CHEATS)
+    write_controller(folder / "memory.py", MEMORY)
+    write_controller(folder / "leaves.py", LEAVES)
+    write_controller(folder / "cheats.py", CHEATS)
     (folder / "broken.py").write_text("import nothing_like_this\n")
     found = graded(tmp_path, folder)
     assert found["ann"].flights[0].digest == alone.flights[0].digest
@@ -95,7 +95,7 @@ def test_the_fair_ones_fly_as_alone(tmp_path, folder):
 
 
 def test_a_submission_that_never_returns_is_ended(tmp_path, folder):
-    write_pilot(folder / "loop.py", LOOP)
+    write_controller(folder / "loop.py", LOOP)
     found = graded(tmp_path, folder, timeout_s=20.0)
     assert found["loop"].problems == ["seed 1: the node took more than 20 s"]
     assert found["loop"].total == 0.0
@@ -103,9 +103,9 @@ def test_a_submission_that_never_returns_is_ended(tmp_path, folder):
 
 @pytest.mark.skipif(bubblewrap() is None, reason="needs bubblewrap: apt-get install bubblewrap")
 def test_a_submission_reaches_nothing_but_its_uav(tmp_path, folder, tcp_port):
-    write_pilot(folder / "ann.py")
+    write_controller(folder / "ann.py")
     names = [str(folder / "ann.py"), str(tmp_path), str(Path.home() / ".bashrc"), "/etc/passwd"]
-    write_pilot(folder / "reads.py", READS.format(names=names, port=tcp_port))
+    write_controller(folder / "reads.py", READS.format(names=names, port=tcp_port))
     assert graded(tmp_path, folder)["reads"].problems == [
         "seed 1: the node did not start: Exception: reaches []"
     ]
@@ -119,7 +119,7 @@ def tcp_port():
 
 
 def test_the_command_writes_text_json_table_and_page(tmp_path, folder):
-    write_pilot(folder / "ann.py")
+    write_controller(folder / "ann.py")
     file = write_assignment(tmp_path)
     table, page = tmp_path / "grades.csv", tmp_path / "grades.html"
     words = ["grade", str(file), str(folder), "--jobs", "1", "--csv", str(table), "--html"]

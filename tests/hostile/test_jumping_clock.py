@@ -53,7 +53,7 @@ def set_clock(request, monkeypatch):
 
 
 def test_wall_time_is_read_for_dates_only():
-    """Durations, ages and rates are of `time.monotonic`; who else reads it is named above."""
+    """Durations, ages and rates are of `time.monotonic`; the modules above read other clocks."""
     package = Path(volery.__file__).parent
     reads = re.compile(r"\btime\.time(_ns)?\b")
     found = {

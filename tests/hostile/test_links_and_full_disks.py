@@ -68,7 +68,7 @@ GROWING = ("flight", "worker_1", "gcs")
 
 @pytest.fixture
 def precious(tmp_path: Path) -> Path:
-    """A file that nobody asked to change."""
+    """A file that no command names."""
     path = tmp_path / "precious"
     path.write_text("precious")
     return path
@@ -162,9 +162,9 @@ def test_a_full_disk_ends_the_log_of_a_ground_station_only(
         desk = gcs._Desk(file)
         desk._print("first")
         desk._print("second")
-    told = capsys.readouterr()
-    assert told.out == "first\nsecond\n"
-    assert told.err == "warning: the log ends here: No space left on device\n"
+    output = capsys.readouterr()
+    assert output.out == "first\nsecond\n"
+    assert output.err == "warning: the log ends here: No space left on device\n"
 
 
 def test_a_link_that_leads_nowhere_counts_as_a_file(tmp_path: Path) -> None:
@@ -213,10 +213,10 @@ def test_permissions_stay(tmp_path: Path) -> None:
 def test_a_pipe_is_written_and_stays(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    heard: list[bytes] = []
-    reader = threading.Thread(target=lambda: heard.append(pipe.read_bytes()))
+    content: list[bytes] = []
+    reader = threading.Thread(target=lambda: content.append(pipe.read_bytes()))
     reader.start()
     write_whole(pipe, "text")
     reader.join(60.0)
-    assert heard == [b"text"]
+    assert content == [b"text"]
     assert pipe.is_fifo()

@@ -83,13 +83,13 @@ def zeros_packed(compression):
     return MAKERS[compression](bytes(BOMB))
 
 
-def bomb(path, compression, said):
+def bomb(path, compression, stated_size):
     """A file with one chunk that unpacks to `BOMB` zeros, and says so or another size."""
     packed = zeros_packed(compression)
     if path.suffix == ".mcap":
-        path.write_bytes(MCAP_MAGIC + mcap_chunk(compression, packed, said))
+        path.write_bytes(MCAP_MAGIC + mcap_chunk(compression, packed, stated_size))
     else:
-        size = struct.pack("<I", said)
+        size = struct.pack("<I", stated_size)
         chunk = bag_record(packed, op=b"\x05", compression=compression.encode(), size=size)
         path.write_bytes(BAG_MAGIC + chunk)
     assert path.stat().st_size < BOMB // 100
@@ -121,15 +121,17 @@ def walked(path):
     return walk
 
 
-@pytest.mark.parametrize("said", [BOMB, 1 << 20, 0])
+@pytest.mark.parametrize("stated_size", [BOMB, 1 << 20, 0])
 @pytest.mark.parametrize(
     ("suffix", "compression"),
     [(".mcap", "lz4"), (".mcap", "zstd"), (".bag", "lz4"), (".bag", "bz2")],
 )
-def test_a_chunk_costs_no_more_than_a_chunk_may(tmp_path, small_chunks, suffix, compression, said):
-    """Whether the chunk tells its size or lies; a player, a summary and a walk stop there."""
+def test_a_chunk_costs_no_more_than_a_chunk_may(
+    tmp_path, small_chunks, suffix, compression, stated_size
+):
+    """Whether the chunk states its size or lies; a player, a summary and a walk stop there."""
     path = tmp_path / f"bomb{suffix}"
-    bomb(path, compression, said)
+    bomb(path, compression, stated_size)
     for read in (summarize, walked, Playback, read_flight, recover):
         assert peak_of(lambda read=read: read(path)) < 3 * CHUNK, read
     assert "1 damaged chunk left out, at byte" in walked(path).problem
@@ -149,7 +151,7 @@ def test_a_chunk_is_unpacked_to_the_byte(compression):
 
 
 def test_chunks_of_a_hundred_megabytes_are_read(tmp_path):
-    """As some recorders write them for pictures."""
+    """As some recorders write them for images."""
     message = bytes(1_000_000)
     records = [mcap_record(5, struct.pack("<HIQQ", 1, k, k, k) + message) for k in range(100)]
     data = mcap_channel(1) + b"".join(records)

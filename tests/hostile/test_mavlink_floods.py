@@ -14,7 +14,7 @@ from volery.mavlink.links.rate_limits import FRAMES_PER_S, RateLimits
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.links.udp_bridge import _UdpLink
 
-PATIENCE_S = 600.0
+TIMEOUT_S = 600.0
 
 
 class Clock:
@@ -25,7 +25,7 @@ class Clock:
 
 
 def flood(accounts, clock, seconds, frames_per_s, step_s=0.01):
-    """Frames that clients get through who send so many as long as they are read."""
+    """Frames that clients get through that send so many as long as they are read."""
     through, resume_s = dict.fromkeys(accounts, 0), dict.fromkeys(accounts, 0.0)
     end_s = clock.now_s + seconds
     while clock.now_s < end_s:
@@ -75,7 +75,7 @@ def test_the_rate_grows_with_the_vehicles():
     assert limits.rate == 50 * 20.0
 
 
-def test_who_floods_is_read_in_few_long_turns():
+def test_a_client_that_floods_is_read_in_few_long_turns():
     account = RateLimits(clock=Clock()).account()
     assert account.charge(500) == 0.0
     assert account.charge(1) >= 0.05
@@ -98,13 +98,13 @@ class Vehicles:
 
 def test_frames_that_come_together_reach_a_vehicle_as_one_message():
     vehicles = Vehicles()
-    party = MavlinkConnection(vehicles, 7, 0)
+    connection = MavlinkConnection(vehicles, 7, 0)
     for system in (1, 2, 3):
-        party.greet(system)
+        connection.greet(system)
     vehicles.taken.clear()
     codec = dialect().MAVLink(None, 245, 190)
     to_second = dialect().MAVLink_param_request_list_message(2, 1).pack(codec)
-    party.take((heartbeat() + to_second) * 30)
+    connection.take((heartbeat() + to_second) * 30)
     assert vehicles.taken == [
         (1, heartbeat() * 30),
         (2, (heartbeat() + to_second) * 30),
@@ -112,7 +112,7 @@ def test_frames_that_come_together_reach_a_vehicle_as_one_message():
     ]
 
 
-def test_who_floods_no_more_is_read_again():
+def test_a_client_that_floods_no_more_is_read_again():
     clock = Clock()
     limits = RateLimits(clock=clock)
     account = limits.account()
@@ -146,12 +146,12 @@ def heartbeat():
 
 
 def connect(bridge):
-    return socket.create_connection(("127.0.0.1", bridge.port), PATIENCE_S)
+    return socket.create_connection(("127.0.0.1", bridge.port), TIMEOUT_S)
 
 
 def until(true):
     waited = threading.Event()
-    for _ in range(int(PATIENCE_S / 0.01)):
+    for _ in range(int(TIMEOUT_S / 0.01)):
         if true():
             return
         waited.wait(0.01)
@@ -167,10 +167,10 @@ def test_what_is_sent_too_fast_stays_with_the_sender(bridge, monkeypatch):
             while sent < 256 << 20:
                 sent += client.send(words)
         assert sent < 64 << 20  # what the two kernels' buffers hold
-        with connect(bridge) as other:  # who is read as before
+        with connect(bridge) as other:  # which is read as before
             until(lambda: len(bridge._clients) == 2)
             other.sendall(heartbeat())
-            until(lambda: sum(one.connection.has_spoken for one in bridge._clients.values()) == 2)
+            until(lambda: sum(one.connection.has_received for one in bridge._clients.values()) == 2)
 
 
 def test_a_client_that_does_not_read_costs_no_memory(bridge):
@@ -188,12 +188,12 @@ def test_idle_clients_give_way_and_those_that_speak_stay(bridge):
     with contextlib.ExitStack() as stack:
         speaking = stack.enter_context(connect(bridge))
         speaking.sendall(heartbeat())
-        until(lambda: any(one.connection.has_spoken for one in bridge._clients.values()))
+        until(lambda: any(one.connection.has_received for one in bridge._clients.values()))
         for _ in range(100):
             stack.enter_context(connect(bridge))
         late = stack.enter_context(connect(bridge))
         late.sendall(heartbeat())
-        until(lambda: sum(one.connection.has_spoken for one in bridge._clients.values()) == 2)
+        until(lambda: sum(one.connection.has_received for one in bridge._clients.values()) == 2)
         assert len(bridge._clients) <= 40
 
 

@@ -1,4 +1,4 @@
-"""Signed MAVLink that someone recorded and sends again: no vehicle hears it a second time."""
+"""Signed MAVLink that an attacker recorded and sends again: no vehicle accepts it a second time."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Vehicles:
     pause_s = 0.0
 
     def __init__(self) -> None:
-        self.heard: list[tuple[int, bytes]] = []
+        self.received: list[tuple[int, bytes]] = []
 
     def send(self, system: int, _link: int, _profile: int, data: bytes) -> None:
         if data:
-            self.heard.append((system, data))
+            self.received.append((system, data))
 
 
 @pytest.fixture(autouse=True)
@@ -79,11 +79,11 @@ def test_a_second_connection_replays_nothing(
 ) -> None:
     recorded = takeoff(station(), 0) + takeoff(station(link=4), 2)
     connection(vehicles).take(recorded)
-    assert len(vehicles.heard) == 2
+    assert len(vehicles.received) == 2
     thief = connection(vehicles, 8)
     thief.take(recorded)
-    assert len(vehicles.heard) == 2
-    assert not thief.has_spoken
+    assert len(vehicles.received) == 2
+    assert not thief.has_received
     assert "its time stamps do not rise" in caplog.text
 
 
@@ -92,8 +92,8 @@ def test_frames_for_no_vehicle_prove_one_connection_only(vehicles: Vehicles) -> 
     recorded = takeoff(station(), 77)
     first.take(recorded)
     thief.take(recorded)
-    assert first.has_spoken
-    assert not thief.has_spoken
+    assert first.has_received
+    assert not thief.has_received
 
 
 def test_a_frame_reaches_each_vehicle_once_over_any_port() -> None:
@@ -112,7 +112,7 @@ def test_links_of_a_station_do_not_disturb_each_other(vehicles: Vehicles) -> Non
     for _ in range(3):
         one.take(takeoff(first))
         other.take(takeoff(second))
-    assert len(vehicles.heard) == 6
+    assert len(vehicles.received) == 6
 
 
 def test_a_restart_forgets_nothing(vehicles: Vehicles) -> None:
@@ -120,11 +120,11 @@ def test_a_restart_forgets_nothing(vehicles: Vehicles) -> None:
     recorded = takeoff(mav, 0)
     connection(vehicles).take(recorded)
     restart()
-    vehicles.heard.clear()
+    vehicles.received.clear()
     connection(vehicles).take(recorded)
-    assert vehicles.heard == []
+    assert vehicles.received == []
     connection(vehicles).take(takeoff(mav, 0))  # the station itself goes on
-    assert len(vehicles.heard) == 2
+    assert len(vehicles.received) == 2
 
 
 def test_the_end_by_a_signal_forgets_nothing(state: Path) -> None:

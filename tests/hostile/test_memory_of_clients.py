@@ -93,7 +93,7 @@ def test_a_client_that_has_left_waits_for_no_collection(server, monkeypatch):
 
 
 def reset(sock):
-    """Ends a connection without a farewell."""
+    """Resets a connection."""
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     sock.close()
 
@@ -124,7 +124,7 @@ def be_refused(server):
 def be_ended(server):
     """The server has no room; the client does not read, and leaves later."""
     sock = send_part(server)
-    for share in tuple(SHARED._shares):
+    for share in tuple(SHARED._held_bytes):
         share.evict()
     until(lambda: not server.clients)
     sock.close()
@@ -149,7 +149,7 @@ def answer_no_ping(server):
 
 
 def leave_when_a_pong_is_late(server):
-    """The server waits for the client's answer to its close frame."""
+    """The server waits for the client's response to its close frame."""
     sock = open_websocket(server.port)
     until(lambda: any(connection.state is State.CLOSING for connection in server._clients))
     reset(sock)
@@ -226,16 +226,16 @@ def test_a_settled_reply_refers_to_nothing(settle):
     class Held:
         """Something to which callbacks refer."""
 
-    held, told = Held(), []
+    held, calls = Held(), []
     gc.disable()
     try:
-        reply = ServiceReply(*[lambda _, held=held: told.append(held is not None)] * 2)
-        reply.when_done(lambda held=held: told.append(held is not None))
+        reply = ServiceReply(*[lambda _, held=held: calls.append(held is not None)] * 2)
+        reply.when_done(lambda held=held: calls.append(held is not None))
         gone = weakref.ref(held)
         del held
         settle(reply)
         settle(reply)
-        assert told == [True, True]
+        assert calls == [True, True]
         assert gone() is None
     finally:
         gc.enable()

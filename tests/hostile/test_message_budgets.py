@@ -54,7 +54,7 @@ BOMBS = {
 
 
 def peak_bytes(action):
-    """Memory that Python and numpy ask for meanwhile."""
+    """Memory that Python and numpy allocate meanwhile."""
     tracemalloc.start()
     try:
         action()
@@ -73,7 +73,7 @@ def test_bombs_are_refused_before_they_are_decoded(bomb):
 
 
 @pytest.mark.parametrize("bomb", ["cbor numbers", "json empty objects"])
-def test_a_client_is_told_and_others_are_served(bomb):
+def test_a_client_is_warned_and_others_are_served(bomb):
     bench = Bench()
     client = bench.peer()
     client.send_raw(BOMBS[bomb])
@@ -95,9 +95,9 @@ def test_what_is_large_and_cheap_passes():
         assert decode_frame(large, limited=True) == scan
 
 
-def test_pictures_and_fragments_hold_no_more_than_other_messages():
+def test_images_and_fragments_hold_no_more_than_other_messages():
     client = Bench().peer()
-    client.send_raw(encode_png(json.dumps({"op": "x", "pad": "A" * budget.MAX_PICTURE_BYTES})))
+    client.send_raw(encode_png(json.dumps({"op": "x", "pad": "A" * budget.MAX_IMAGE_BYTES})))
     (status,) = client.read()
     assert "bytes of pixels" in status["msg"]
     client.send_raw(encode_png('{"op":[' + "[]," * budget.MAX_CONTAINERS + "[]]}"))
@@ -113,12 +113,12 @@ def test_pictures_and_fragments_hold_no_more_than_other_messages():
 # ------------------------------------------------------------------------------ before the token
 
 
-def test_a_stranger_may_send_little():
+def test_an_unauthorized_client_may_send_little():
     bench = Bench(token="secret")
-    stranger = bench.peer()
-    stranger.send_raw(json.dumps({"op": "auth", "token": "secret", "pad": "A" * 5000}))
-    assert not stranger.peer.authorized
-    assert "more than 4096 bytes" in stranger.peer.refused
+    client = bench.peer()
+    client.send_raw(json.dumps({"op": "auth", "token": "secret", "pad": "A" * 5000}))
+    assert not client.peer.authorized
+    assert "more than 4096 bytes" in client.peer.refused
 
 
 @pytest.fixture
@@ -131,13 +131,13 @@ def guarded():
     simulation.close()
 
 
-def test_a_long_message_of_a_stranger_is_not_received(guarded):
+def test_a_long_message_of_an_unauthorized_client_is_not_received(guarded):
     with connect(guarded) as socket:
         with contextlib.suppress(ConnectionClosed):
             socket.send("A" * 20_000_000)
         with pytest.raises(ConnectionClosed) as closed:
             socket.recv(60.0)
-        assert closed.value.rcvd.code == 1009  # too big, told by the head alone
+        assert closed.value.rcvd.code == 1009  # too big, known from the head alone
     with connect(guarded) as socket:
         socket.send(json.dumps({"op": "bogus"}))
         assert "not authorized" in socket.recv(60.0)
@@ -226,7 +226,7 @@ def test_arrays_of_messages_are_counted_before_any_is_made(name):
         check_objects(b"\0\0\0\0" + struct.pack(">I", 50_000), "tf2_msgs/msg/TFMessage", CDR)
 
 
-def test_a_client_of_ros_tcp_is_told(monkeypatch):
+def test_a_client_of_ros_tcp_is_warned(monkeypatch):
     graph = HandGraph()
     session = EndpointSession(graph.gateway, "hostile", "ros1", 10, lambda: None)
     parser = RosTcpFrameParser()
@@ -239,8 +239,8 @@ def test_a_client_of_ros_tcp_is_told(monkeypatch):
     take("__publish", json.dumps(fields).encode())
     made = peak_bytes(lambda: take("/tf", ROS1_BOMBS["transforms"][1]))
     assert made < 3 * len(ROS1_BOMBS["transforms"][1])  # the parser's copies, and no messages
-    told = b"".join(bytes(part) for part in session.outbox.gather())
-    assert b"send several messages" in told
+    sent = b"".join(bytes(part) for part in session.outbox.gather())
+    assert b"send several messages" in sent
     take("/tf", struct.pack("<I", 3000) + bytes(76 * 3000))
     assert session.reading is not None
     graph.work_off()

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from volery.cli import tables
 from volery.cli.app import app
-from volery.cli.error_reporting import _Words, complain, warn
+from volery.cli.error_reporting import _LogFormatter, complain, warn
 from volery.cli.node_logs import _Terminal
 from volery.cli.progress import FlightProgress
 from volery.core.plain_text import plain, plain_message
@@ -50,7 +50,7 @@ def test_tables_errors_warnings_and_logs(capsys: pytest.CaptureFixture[str]) -> 
     complain(EVIL)
     warn(EVIL)
     record = logging.LogRecord("volery", logging.WARNING, "", 0, "client %s", (EVIL,), None)
-    assert _Words().format(record) == f"warning: client {SPELLED}"
+    assert _LogFormatter().format(record) == f"warning: client {SPELLED}"
     _Terminal().emit(record)
     with FlightProgress(EVIL, 1.0) as progress:
         progress.update(0.5, 1.0, paused=True)

@@ -50,8 +50,8 @@ def test_a_viewers_filter_does_not_freeze_the_simulation(simulate, flat_data):
     client = Client(simulate(flat_data))
     request = zero_message("simulation_interfaces/srv/GetEntities_Request")
     request.filters.filter = "(|||||||||){14}x"
-    answer = client.call("/get_entities", request)
-    assert answer.result.result in (1, 4)
+    response = client.call("/get_entities", request)
+    assert response.result.result in (1, 4)
     client.simulation.step(1)
 
 

@@ -1,4 +1,4 @@
-"""Strangers at the ports that rospy opens: silent, slow and oversize ones."""
+"""Unknown clients at the ports that rospy opens: silent, slow and oversize ones."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ def connect(address):
 
 
 class Headers:
-    """A server of connection headers that answers each header with its own bytes."""
+    """A server of connection headers that responds to each header with its own bytes."""
 
     def __init__(self, header_s=HANG_S):
         self.listener = open_listener("127.0.0.1", 0, "TCPROS", limits=ConnectionLimits(512))
         self.address = self.listener.getsockname()
-        self._server = HeaderServer(self.listener, self._answer, header_s)
+        self._server = HeaderServer(self.listener, self._respond, header_s)
         self._thread = threading.Thread(target=self._server.run)
         self._thread.start()
 
-    def _answer(self, connection, _address):
+    def _respond(self, connection, _address):
         with connection:
             connection.setblocking(False)  # all of it is there
             (length,) = struct.unpack("<I", connection.recv(4))
@@ -72,10 +72,10 @@ def is_answered(address):
 
 
 @pytest.mark.parametrize("sent", [b"", HEADER[:2], HEADER[:9]])
-def test_silent_connections_keep_nobody_out(headers, sent):
-    with ExitStack() as strangers:
+def test_silent_connections_keep_no_client_out(headers, sent):
+    with ExitStack() as clients:
         for _ in range(2 * MAX_UNPROVEN):
-            strangers.enter_context(connect(headers.address)).sendall(sent)
+            clients.enter_context(connect(headers.address)).sendall(sent)
         assert is_answered(headers.address)
 
 
@@ -89,9 +89,9 @@ def test_a_header_may_come_in_pieces(headers):
 
 @pytest.mark.parametrize("length", [0, MAX_HEADER_BYTES + 1, (1 << 32) - 1])
 def test_headers_of_absurd_lengths_end_the_connection(headers, length):
-    with connect(headers.address) as stranger:
-        stranger.sendall(struct.pack("<I", length))
-        assert is_ended(stranger)
+    with connect(headers.address) as client:
+        client.sendall(struct.pack("<I", length))
+        assert is_ended(client)
     assert is_answered(headers.address)
 
 
@@ -105,16 +105,16 @@ def test_the_longest_header_arrives(headers):
 
 
 def test_a_header_that_does_not_come_ends_the_connection():
-    with closing(Headers(header_s=0.05)) as served, connect(served.address) as stranger:
-        stranger.sendall(HEADER[:3])
-        assert is_ended(stranger)
+    with closing(Headers(header_s=0.05)) as served, connect(served.address) as client:
+        client.sendall(HEADER[:3])
+        assert is_ended(client)
 
 
 def test_a_client_that_leaves_early_is_forgotten(headers):
-    with connect(headers.address) as stranger:
-        stranger.sendall(HEADER[:9])
-        stranger.shutdown(socket.SHUT_WR)
-        assert is_ended(stranger)
+    with connect(headers.address) as client:
+        client.sendall(HEADER[:9])
+        client.shutdown(socket.SHUT_WR)
+        assert is_ended(client)
 
 
 # -------------------------------------------------------------------------------- rospy's servers
@@ -184,9 +184,9 @@ def say(address):
 @needs_rospy
 def test_silent_callers_give_way(guarded):
     before = threading.active_count()
-    with calls() as address, ExitStack() as strangers:
+    with calls() as address, ExitStack() as clients:
         for _ in range(2 * port_guards.MAX_CALLERS):
-            strangers.enter_context(connect(address))
+            clients.enter_context(connect(address))
             assert threading.active_count() < before + port_guards.MAX_CALLERS + 40
         assert say(address) == "it"
 
@@ -227,7 +227,7 @@ def test_one_request_is_one_call(guarded):
 
 
 @needs_rospy
-def test_a_call_of_the_most_bytes_is_answered(guarded):
+def test_a_call_of_the_maximum_size_is_answered(guarded):
     room = port_guards.MAX_CALL_BYTES - len(dumps(("",), "say"))
     with calls() as address, ServerProxy("http://{}:{}".format(*address)) as program:
         assert program.say("x" * room) == "x" * room

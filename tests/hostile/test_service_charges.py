@@ -1,6 +1,6 @@
 """Every service that a viewer may call is charged to its caller, in a simulation and in playback.
 
-The CPU clock of these tests goes on by a millisecond at each reading, so that nothing depends on
+The CPU clock of these tests advances by a millisecond at each call, so that nothing depends on
 the machine.
 """
 
@@ -42,9 +42,9 @@ def charge(inbox, gateway, service, serve):
 
 
 def stop_clocks(inbox):
-    """CPU time goes on at each reading, and nobody earns anything."""
-    readings = itertools.count()
-    inbox._cpu_s = lambda: TICK_S * next(readings)
+    """CPU time advances at each call, and no client earns anything."""
+    ticks = itertools.count()
+    inbox._cpu_s = lambda: TICK_S * next(ticks)
     inbox._budget._now_s = lambda: inbox._budget._last_s
 
 
@@ -98,12 +98,12 @@ def test_new_subscribers_share_a_budget_of_a_player(log):
     """What was published last is read from the log for each of them."""
     with LogPlayer(log, paused=True) as player:
         player._budget._now_s = lambda: player._budget._last_s
-        readings = []
+        calls = []
         show = player._playback.show_to_newcomers
-        player._playback.show_to_newcomers = lambda: (readings.append(1), show())
+        player._playback.show_to_newcomers = lambda: (calls.append(1), show())
         player.wait(0.0)
-        assert readings
+        assert calls
         player._budget.spend("new subscribers", 1.0)
-        readings.clear()
+        calls.clear()
         player.wait(0.0)
-        assert not readings
+        assert not calls

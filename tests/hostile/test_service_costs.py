@@ -36,8 +36,8 @@ def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
     folder.mkdir(parents=True)
     text = '[types.f450]\n[[uavs]]\ntype = "f450"\nposition_m = [0, 0]\n'
     (folder / "scenario.toml").write_text(f'name = "mine"\n{text}')
-    shelf = ScenarioCatalog(tmp_path / "scenarios")
-    client = Client(simulate(flat_data, shelf=shelf))
+    catalog = ScenarioCatalog(tmp_path / "scenarios")
+    client = Client(simulate(flat_data, shelf=catalog))
     worlds = client.call("/get_available_worlds", None).worlds
     assert "mine" in [world.name for world in worlds]
     monkeypatch.setattr("volery.scenario.catalog.load_scenario", lambda *_, **__: 1 / 0)
@@ -88,12 +88,12 @@ def test_a_loop_of_calls_is_deferred_in_order_and_others_are_not(client):
         client.session.publish("/burn", String(str(number)))
     other = Client(simulation, "other")
     other.session.advertise("/other", String.__msgtype__)
-    heard = []
-    simulation.graph.subscribe("/other", heard.append, String)
+    received = []
+    simulation.graph.subscribe("/other", received.append, String)
     simulation.step(200)
     other.session.publish("/other", String("x"))
     simulation.step(1)
-    assert heard
+    assert received
     spent_s = 0.002 * len(taken)
     wall_s = max(time.perf_counter() - before_s, time.thread_time() - cpu_s)
     assert spent_s <= MAX_FRACTION * wall_s + 0.2

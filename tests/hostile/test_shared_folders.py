@@ -38,8 +38,8 @@ def test_kernels_get_a_private_folder(cache_dir: CacheDir, tmp_path: Path) -> No
     finally:
         os.umask(before)
     assert folder == tmp_path / "cache" / "volery" / "kernels" / "key"
-    for place in (folder, folder.parent, folder.parent.parent):
-        assert place.stat().st_mode & 0o777 == 0o700
+    for each in (folder, folder.parent, folder.parent.parent):
+        assert each.stat().st_mode & 0o777 == 0o700
     (folder / "ours.nbi").write_bytes(b"index")
     assert (cache_dir() / "ours.nbi").exists()
 
@@ -74,7 +74,7 @@ def test_a_linked_folder_of_kernels_is_refused(
     cache_dir: CacheDir, caplog: pytest.LogCaptureFixture, tmp_path: Path, name: str
 ) -> None:
     folder = cache_dir()
-    link = next(place for place in (folder, *folder.parents) if place.name == name)
+    link = next(each for each in (folder, *folder.parents) if each.name == name)
     link.rename(tmp_path / "foreign")
     link.symlink_to(tmp_path / "foreign")
     with caplog.at_level(logging.WARNING):
@@ -88,7 +88,7 @@ def test_a_cache_below_a_folder_of_everyone_is_refused(
     cache_dir: CacheDir, caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     (tmp_path / "cache").mkdir()
-    (tmp_path / "cache").chmod(0o777)  # whoever writes it exchanges what is below
+    (tmp_path / "cache").chmod(0o777)  # any user that may write it can replace what is below
     with caplog.at_level(logging.WARNING):
         assert cache_dir().is_relative_to(tmp_path / "temporary")
     assert f"other users can write {tmp_path / 'cache'}" in caplog.text
@@ -141,7 +141,7 @@ def test_answers_that_others_could_write_are_ignored(
     with pytest.raises(ScenarioError, match="give --trust"):
         may_run_local_code(file, ["evil"])
     assert "saved answers about nodes are ignored" in capsys.readouterr().err
-    trust._remember(file, ["mine"])  # in a private file, if the place allows one
+    trust._remember(file, ["mine"])  # in a private file, if the folder allows one
     if hole != "above":
         assert json.loads(kept.read_text()) == {str(file): ["mine"]}
         assert may_run_local_code(file, ["mine"])

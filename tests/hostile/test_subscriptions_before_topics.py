@@ -24,30 +24,30 @@ def ignore(_message):
 
 
 @pytest.mark.parametrize("by", ["advertise", "subscribe"])
-def test_the_type_of_the_simulation_wins_and_the_subscriber_is_told(graph, by):
-    told = []
-    graph.attach(TOPIC, ignore, EMPTY, on_ended=told.append)
+def test_the_type_of_the_simulation_wins_and_the_subscriber_gets_an_error(graph, by):
+    errors = []
+    graph.attach(TOPIC, ignore, EMPTY, on_ended=errors.append)
     if by == "advertise":
         graph.advertise(TOPIC, TEXT)
     else:
         graph.subscribe(TOPIC, ignore, TEXT)
     assert graph.topic_type(TOPIC) == TEXT
-    assert told == [ENDED]
+    assert errors == [ENDED]
     with pytest.raises(GraphError, match="carries"):
         graph.attach(TOPIC, ignore, EMPTY)
 
 
 def test_clients_of_several_types_wait_and_the_right_one_receives(graph):
-    told, got = [], []
-    graph.attach(TOPIC, ignore, EMPTY, on_ended=told.append)
-    graph.attach(TOPIC, got.append, TEXT, on_ended=told.append)
+    errors, got = [], []
+    graph.attach(TOPIC, ignore, EMPTY, on_ended=errors.append)
+    graph.attach(TOPIC, got.append, TEXT, on_ended=errors.append)
     graph.advertise(TOPIC, TEXT).publish(message_type(TEXT)("hello"))
     graph.deliver()
     assert [published.message.data for published in got] == ["hello"]
-    assert told == [ENDED]
+    assert errors == [ENDED]
 
 
-def test_who_leaves_leaves_no_type_behind(graph):
+def test_a_client_that_leaves_leaves_no_type_behind(graph):
     first = graph.attach(TOPIC, ignore, EMPTY)
     second = graph.attach(TOPIC, lambda _message: None, TEXT)
     first.cancel()

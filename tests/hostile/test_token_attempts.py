@@ -1,7 +1,7 @@
 """Wrong tokens by the hundred and in parallel: they wait for each other, the right token gets in.
 
 Where PENALTY_S is an hour, a guess is answered only once its guesser has had his turn: so tests see
-who waits for whom without a clock.
+which client waits for which without a clock.
 """
 
 import asyncio
@@ -29,11 +29,11 @@ from volery.server.page_server import PageServer
 from volery.server.settings import PageSettings
 
 TOKEN = "the right one"
-PATIENCE_S = 600.0
+TIMEOUT_S = 600.0
 HOUR_S = 3600.0
 HERE, ELSEWHERE = "127.0.0.1", "127.0.0.2"
 """Addresses of clients; both are of this machine, and count as two."""
-GUESSES = 30
+ATTEMPTS = 30
 
 
 # ---------------------------------------------------------------------------------- the mechanism
@@ -70,7 +70,7 @@ def test_one_address_has_one_guess_at_a_time_and_delays_no_other():
         assert some.log == ["wrong"]
         await some.show("right", ELSEWHERE, is_right=True)
         assert some.log == ["wrong", "right"]
-        some.left.set()  # those who leave cost the others no time
+        some.left.set()  # clients that leave cost the others no time
         await asyncio.gather(*tasks)
         assert len(some.log) == 201
         assert some.guesses.num_waiting == 0
@@ -157,10 +157,10 @@ def rosbridge(slow):
 
 
 def request(port, path, *, source=HERE, bearer=None):
-    """A connection that has asked for a page, and not yet read the answer."""
-    sock = socket.create_connection(("127.0.0.1", port), PATIENCE_S, source_address=(source, 0))
-    said = "" if bearer is None else f"Authorization: Bearer {bearer}\r\n"
-    sock.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n{said}\r\n".encode())
+    """A connection that has requested a page, and not yet read the response."""
+    sock = socket.create_connection(("127.0.0.1", port), TIMEOUT_S, source_address=(source, 0))
+    header = "" if bearer is None else f"Authorization: Bearer {bearer}\r\n"
+    sock.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n{header}\r\n".encode())
     return sock
 
 
@@ -173,103 +173,103 @@ def is_unanswered(sock):
     return not select.select([sock], [], [], 0.0)[0]
 
 
-@pytest.mark.parametrize("way", ["query", "bearer"])
-def test_page(page, attempts, way):
+@pytest.mark.parametrize("method", ["query", "bearer"])
+def test_page(page, attempts, method):
     def show(token, source=HERE):
-        if way == "bearer":
+        if method == "bearer":
             return request(page.port, "/api/status", source=source, bearer=token)
         return request(page.port, f"/api/status?token={token.replace(' ', '+')}", source=source)
 
-    guesses = [show(f"guess {k}") for k in range(GUESSES)]
+    attempts = [show(f"guess {k}") for k in range(ATTEMPTS)]
     assert status_of(show(TOKEN, ELSEWHERE)) == 200
     late = show(TOKEN)
-    until_waiting(attempts, GUESSES + 1)
-    assert all(map(is_unanswered, guesses))  # in parallel they get no more than one by one
-    for guess in guesses:
-        guess.close()
+    until_waiting(attempts, ATTEMPTS + 1)
+    assert all(map(is_unanswered, attempts))  # in parallel they get no more than one by one
+    for attempt in attempts:
+        attempt.close()
     assert status_of(late) == 200
 
 
-def test_a_cookie_waits_for_nobody(page):
+def test_a_cookie_never_waits(page):
     with urllib.request.urlopen(
-        f"http://127.0.0.1:{page.port}/api/status?token=viewers", timeout=PATIENCE_S
-    ) as answer:
-        cookie = answer.headers["Set-Cookie"].partition(";")[0]
-    guesses = [request(page.port, f"/?token={k}") for k in range(GUESSES)]
+        f"http://127.0.0.1:{page.port}/api/status?token=viewers", timeout=TIMEOUT_S
+    ) as response:
+        cookie = response.headers["Set-Cookie"].partition(";")[0]
+    attempts = [request(page.port, f"/?token={k}") for k in range(ATTEMPTS)]
     plain = urllib.request.Request(
         f"http://127.0.0.1:{page.port}/api/status", headers={"Cookie": cookie}
     )
-    with urllib.request.urlopen(plain, timeout=PATIENCE_S) as answer:
-        assert json.load(answer)["role"] == "viewer"
-    for guess in guesses:
-        guess.close()
+    with urllib.request.urlopen(plain, timeout=TIMEOUT_S) as response:
+        assert json.load(response)["role"] == "viewer"
+    for attempt in attempts:
+        attempt.close()
 
 
-def test_a_page_of_a_stranger_cannot_guess(page):
+def test_a_foreign_page_cannot_guess(page):
     foreign = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
     for token in ("guess", TOKEN.replace(" ", "+")):
         asked = urllib.request.Request(
             f"http://127.0.0.1:{page.port}/?token={token}", headers=foreign
         )
         with pytest.raises(urllib.error.HTTPError, match="403"):
-            urllib.request.urlopen(asked, timeout=PATIENCE_S)
+            urllib.request.urlopen(asked, timeout=TIMEOUT_S)
 
 
 def socket_of(server, source=HERE):
     return socket.create_connection(
-        ("127.0.0.1", server.port), PATIENCE_S, source_address=(source, 0)
+        ("127.0.0.1", server.port), TIMEOUT_S, source_address=(source, 0)
     )
 
 
-def enter(server, token, way, source=HERE):
+def enter(server, token, method, source=HERE):
     """Connects and shows a token; whether it is the right one."""
     address = f"ws://127.0.0.1:{server.port}/"
-    options = {"sock": socket_of(server, source), "open_timeout": PATIENCE_S, "close_timeout": 0.1}
+    options = {"sock": socket_of(server, source), "open_timeout": TIMEOUT_S, "close_timeout": 0.1}
     try:
-        if way == "query":
+        if method == "query":
             address += f"?token={token.replace(' ', '+')}"
-        elif way == "bearer":
+        elif method == "bearer":
             options["additional_headers"] = {"Authorization": f"Bearer {token}"}
         with connect(address, **options) as client:
-            if way == "auth":
+            if method == "auth":
                 client.send(json.dumps({"op": "auth", "token": token}))
             client.send(json.dumps({"op": "call_service", "service": "/rosapi/get_time"}))
-            return '"result": true' in client.recv(PATIENCE_S).replace('":true', '": true')
+            return '"result": true' in client.recv(TIMEOUT_S).replace('":true', '": true')
     except (InvalidStatus, ConnectionClosed):
         return False
 
 
-@pytest.mark.parametrize("way", ["query", "bearer", "auth"])
-def test_rosbridge(rosbridge, way, monkeypatch):
-    monkeypatch.setattr("volery.bridges.rosbridge.server.HANDSHAKE_TIMEOUT_S", PATIENCE_S)
+@pytest.mark.parametrize("method", ["query", "bearer", "auth"])
+def test_rosbridge(rosbridge, method, monkeypatch):
+    monkeypatch.setattr("volery.bridges.rosbridge.server.HANDSHAKE_TIMEOUT_S", TIMEOUT_S)
     outcomes = []
 
-    def guess():
+    def attempt():
         with contextlib.suppress(OSError, EOFError, TimeoutError):
-            outcomes.append(enter(rosbridge, "guess", way))
+            outcomes.append(enter(rosbridge, "guess", method))
 
     first = socket_of(rosbridge)  # a plain one, which can be closed from here
     key = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     key += "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
     first.sendall(f"GET /?token=first HTTP/1.1\r\nHost: localhost\r\n{key}".encode())
     until_waiting(rosbridge._attempts, 1)
-    guessers = [threading.Thread(target=guess, daemon=True) for _ in range(3)]
+    guessers = [threading.Thread(target=attempt, daemon=True) for _ in range(3)]
     for one in guessers:
         one.start()
     until_waiting(rosbridge._attempts, 4)
     assert outcomes == []
-    assert enter(rosbridge, TOKEN, way, ELSEWHERE)
+    assert enter(rosbridge, TOKEN, method, ELSEWHERE)
     monkeypatch.setattr(rosbridge._attempts, "_penalty_s", 0.001)
     first.close()  # its turn ends, and with it the wait of the others
     for one in guessers:
-        one.join(PATIENCE_S)
+        one.join(TIMEOUT_S)
     assert outcomes == [False] * 3
-    assert enter(rosbridge, TOKEN, way)
+    assert enter(rosbridge, TOKEN, method)
 
 
 def until_waiting(attempts, count):
     waited = threading.Event()
-    for _ in range(int(PATIENCE_S / 0.02)):
+    for _ in range(int(TIMEOUT_S / 0.02)):
         if attempts.num_waiting >= count:
             return
         waited.wait(0.02)
@@ -293,7 +293,7 @@ def test_the_communication_server():
         guessers = [Station(Identity(k, 0), port=server.port, token="guess") for k in range(1, 9)]
         right = Station(Identity(9, 0), port=server.port, token=TOKEN)
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 outcomes = await asyncio.gather(
                     *(one.start() for one in (*guessers, right)), return_exceptions=True
                 )

@@ -38,13 +38,13 @@ PIECE = 1 << 18
 LONGEST_S = 120.0
 
 
-class Holder:
-    """A share that records what it is told."""
+class Reservation:
+    """A share that records its callbacks."""
 
     def __init__(self, account):
-        self.told = []
+        self.calls = []
         self.share = account.open(
-            lambda: self.told.append("evict"), lambda: self.told.append("resume")
+            lambda: self.calls.append("evict"), lambda: self.calls.append("resume")
         )
 
     def hold(self, megabytes, *, may_wait=True):
@@ -57,48 +57,48 @@ def account():
 
 
 def test_a_lone_client_has_all(account):
-    alone = Holder(account)
+    alone = Reservation(account)
     assert alone.hold(10)
     assert not alone.hold(10.1)
     alone.share.close()
     assert account.num_bytes == 0
 
 
-def test_who_has_less_than_its_part_gets_room_of_the_oldest_that_has_more(account):
-    old, new, small = Holder(account), Holder(account), Holder(account)
+def test_a_client_below_its_part_gets_room_of_the_oldest_above_its_part(account):
+    old, new, small = Reservation(account), Reservation(account), Reservation(account)
     assert old.hold(5)
     assert new.hold(5)
     assert small.hold(1)
-    assert (old.told, new.told) == (["evict"], [])
+    assert (old.calls, new.calls) == (["evict"], [])
     assert account.num_bytes == 6 * MB
 
 
-def test_who_has_more_than_its_part_waits_for_room(account):
-    greedy = [Holder(account) for _ in range(5)]
-    for holder in greedy:
-        assert holder.hold(2)
+def test_a_client_above_its_part_waits_for_room(account):
+    greedy = [Reservation(account) for _ in range(5)]
+    for reservation in greedy:
+        assert reservation.hold(2)
     assert not greedy[0].hold(2.1)
     assert not greedy[1].hold(2.1)
-    assert [holder.told for holder in greedy] == [[]] * 5
+    assert [reservation.calls for reservation in greedy] == [[]] * 5
     greedy[4].share.close()
-    assert [holder.told for holder in greedy] == [["resume"], ["resume"], [], [], []]
+    assert [reservation.calls for reservation in greedy] == [["resume"], ["resume"], [], [], []]
 
 
 @pytest.mark.parametrize("left", [0, 1])
-def test_who_waits_with_less_than_its_part_is_read_again(account, left):
+def test_a_client_that_waits_below_its_part_is_read_again(account, left):
     """The others do not move: it would wait until it is ended, also if its client has left."""
-    greedy = [Holder(account) for _ in range(5)]
-    for holder in greedy:
-        assert holder.hold(2)
-    for holder in greedy:
-        assert not holder.hold(2.1)
+    greedy = [Reservation(account) for _ in range(5)]
+    for reservation in greedy:
+        assert reservation.hold(2)
+    for reservation in greedy:
+        assert not reservation.hold(2.1)
     assert greedy[0].hold(left)  # the application has taken a message
-    assert greedy[0].told == ["resume"]
+    assert greedy[0].calls == ["resume"]
     assert greedy[0].hold(2)
 
 
-def test_who_cannot_wait_is_refused_and_holds_what_it_had(account):
-    one, other = Holder(account), Holder(account)
+def test_a_client_that_cannot_wait_is_refused_and_holds_what_it_had(account):
+    one, other = Reservation(account), Reservation(account)
     assert one.hold(5)
     assert other.hold(5)
     assert not other.hold(6, may_wait=False)
@@ -108,7 +108,7 @@ def test_who_cannot_wait_is_refused_and_holds_what_it_had(account):
 
 
 def test_short_messages_count_as_none(account):
-    one = Holder(account)
+    one = Reservation(account)
     assert one.share.hold(100)
     assert account.num_bytes == 0
 
@@ -175,38 +175,38 @@ def until(condition):
 
 def begin(server, size):
     """A connection that has announced a message of so many bytes."""
-    stranger = socket.create_connection(("127.0.0.1", server.port), 60.0)
+    client = socket.create_connection(("127.0.0.1", server.port), 60.0)
     if isinstance(server, RosTcpEndpoint):
-        stranger.sendall(struct.pack("<I", 2) + b"/x" + struct.pack("<I", size))
-        return stranger
-    stranger.sendall(
+        client.sendall(struct.pack("<I", 2) + b"/x" + struct.pack("<I", size))
+        return client
+    client.sendall(
         f"GET /rosbridge HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
         "Sec-WebSocket-Version: 13\r\n\r\n".encode()
     )
-    answer = b""
-    while b"\r\n\r\n" not in answer:
-        answer += stranger.recv(1)
-    stranger.sendall(bytes([0x80 | Opcode.TEXT, 0xFF]) + struct.pack(">Q", size) + bytes(4))
-    return stranger
+    response = b""
+    while b"\r\n\r\n" not in response:
+        response += client.recv(1)
+    client.sendall(bytes([0x80 | Opcode.TEXT, 0xFF]) + struct.pack(">Q", size) + bytes(4))
+    return client
 
 
-def push(stranger, size):
+def push(client, size):
     """Sends as much as the server takes within a moment."""
-    stranger.settimeout(0.2)
+    client.settimeout(0.2)
     rest = memoryview(bytes(size))
     with suppress(OSError):
         while rest:
-            rest = rest[stranger.send(rest) :]
+            rest = rest[client.send(rest) :]
 
 
 def serves(server):
     if isinstance(server, RosTcpEndpoint):
         with socket.create_connection(("127.0.0.1", server.port), 60.0) as client:
-            told = json.dumps({}).encode()
+            body = json.dumps({}).encode()
             name = b"__topic_list"
-            lengths = struct.pack("<I", len(name)), struct.pack("<I", len(told))
-            client.sendall(b"".join((lengths[0], name, lengths[1], told)))
+            lengths = struct.pack("<I", len(name)), struct.pack("<I", len(body))
+            client.sendall(b"".join((lengths[0], name, lengths[1], body)))
             return bool(client.recv(1))
     with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as client:
         client.send('{"op": "call_service", "service": "/nobody", "id": "1"}')
@@ -214,10 +214,10 @@ def serves(server):
 
 
 def test_many_clients_share_one_account(server, small_account):
-    with ExitStack() as strangers:
+    with ExitStack() as clients:
         for _ in range(12):
-            stranger = strangers.enter_context(begin(server, 9 * MB))
-            push(stranger, 3 * MB)
+            client = clients.enter_context(begin(server, 9 * MB))
+            push(client, 3 * MB)
             assert small_account.num_bytes < 8 * MB + 12 * PIECE
         until(lambda: small_account.num_bytes > 4 * MB)
         assert serves(server)
@@ -232,9 +232,9 @@ def test_a_crowd_that_may_go_on_at_once_is_read_in_turns(event):
 
     async def scene():
         loop, read = asyncio.get_running_loop(), []
-        crowd = [Holder(account) for _ in range(num)]
-        for holder in crowd:
-            holder.hold(1)
+        crowd = [Reservation(account) for _ in range(num)]
+        for reservation in crowd:
+            reservation.hold(1)
         arriving = [
             unfinished.ArrivingMessages(
                 loop, lambda _: None, lambda: None, lambda k=k: read.append(k), account
@@ -262,16 +262,16 @@ def test_a_crowd_that_may_go_on_at_once_is_read_in_turns(event):
 
 def test_many_clients_are_read_in_turns(server, small_account):
     """Each of them gets what it sends to the server, and others are answered meanwhile."""
-    with ExitStack() as strangers:
-        crowd = [strangers.enter_context(begin(server, MB // 4)) for _ in range(24)]
-        for stranger in crowd:
-            push(stranger, MB // 4 - 10)
+    with ExitStack() as clients:
+        crowd = [clients.enter_context(begin(server, MB // 4)) for _ in range(24)]
+        for client in crowd:
+            push(client, MB // 4 - 10)
         until(lambda: small_account.num_bytes > 5 * MB)
         assert small_account.is_crowded
         assert serves(server)
-        for stranger in crowd:
-            stranger.settimeout(60.0)
-            stranger.sendall(bytes(10))
+        for client in crowd:
+            client.settimeout(60.0)
+            client.sendall(bytes(10))
         until(lambda: small_account.num_bytes == 0)
         assert serves(server)
 
@@ -320,7 +320,7 @@ class Channel:
         return message
 
     async def send_all(self, messages):
-        """Sends to nobody."""
+        """Sends nothing."""
 
     async def close(self, code=1000, reason=""):
         """Ends nothing."""

@@ -16,7 +16,7 @@ import pytest
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import DataFileError, RecordingError, ScenarioError, VoleryError
-from volery.core.toml_text import MOST_PARTS, parse_toml
+from volery.core.toml_text import MAX_PARTS, parse_toml
 from volery.runtime.services.recording import RecordingServices
 from volery.scenario.data_file_bases import read_toml
 from volery.scenario.load import load_scenario
@@ -26,7 +26,7 @@ from volery.server.uploads.scenario_file import text_of
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
 from live_graph import LiveGraph
-from page_bench import ask, serving
+from page_bench import fetch, serving
 
 # ------------------------------------------------------------------------------------- names
 
@@ -40,17 +40,17 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 def test_control_characters_in_an_uploads_name(server: Any) -> None:
     path = "/api/uploads?kind=grid_map&name=a%00b%1b%5b2J%0ac.csv"
-    answer = ask(server, path, "POST", b"0,x\n")
-    assert answer.status == 422
-    assert "'x'; allowed are 0 and 1" in answer.error
-    assert answer.error.isprintable()
+    response = fetch(server, path, "POST", b"0,x\n")
+    assert response.status == 422
+    assert "'x'; allowed are 0 and 1" in response.error
+    assert response.error.isprintable()
 
 
 def test_control_characters_in_a_recordings_name(server: Any) -> None:
-    answer = ask(server, "/api/recordings?name=a%00b.mcap", "POST", b"no log")
-    assert answer.status == 422
-    assert answer.error.isprintable()
-    assert ask(server, "/api/recordings/a%00b.mcap").status == 404
+    response = fetch(server, "/api/recordings?name=a%00b.mcap", "POST", b"no log")
+    assert response.status == 422
+    assert response.error.isprintable()
+    assert fetch(server, "/api/recordings/a%00b.mcap").status == 404
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ DEEP = {
     "quoted key": '"\\"a"." b".' * 20_000 + "a = 1",
     "literal key": "'a'." * 30_000 + "a = 1",
     "inline table": "t = {" + "a." * 60_000 + "a = 1}",
-    "just too deep": "a." * MOST_PARTS + "a = 1",
+    "just too deep": "a." * MAX_PARTS + "a = 1",
     "lists": "a = " + "[" * 100_000,
     "inline tables": "a = " + "{a = " * 30_000,
 }
@@ -101,8 +101,8 @@ def test_deep_toml_is_refused_before_it_is_parsed(
 
 def test_what_looks_deep_is_read() -> None:
     text = (
-        f"p = [{'1.0, ' * 1000}]\n{'x.' * (MOST_PARTS - 1)}x = 1\n"
-        f"q = '{'one. two, ' * 100}'\n[{'y.' * (MOST_PARTS - 1)}y]\n"
+        f"p = [{'1.0, ' * 1000}]\n{'x.' * (MAX_PARTS - 1)}x = 1\n"
+        f"q = '{'one. two, ' * 100}'\n[{'y.' * (MAX_PARTS - 1)}y]\n"
     )
     assert parse_toml(text) == tomllib.loads(text)
 
@@ -117,9 +117,9 @@ def _never(_text: str) -> dict[str, Any]:
 def star(corners: int, radius_deg: float = 0.003) -> list[list[float]]:
     ring = []
     for k in range(corners):
-        reach = radius_deg * (1.0 if k % 2 else 0.5)
+        radius = radius_deg * (1.0 if k % 2 else 0.5)
         angle = 2.0 * math.pi * k / corners
-        ring.append([24.9 + reach * math.cos(angle), 60.1 + reach * math.sin(angle)])
+        ring.append([24.9 + radius * math.cos(angle), 60.1 + radius * math.sin(angle)])
     return [*ring, ring[0]]
 
 
@@ -150,7 +150,7 @@ def test_outlines_that_take_minutes_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if "overlap" in why:
-        monkeypatch.setattr(scenario_builder, "MOST_CROWDING", 1e12)
+        monkeypatch.setattr(scenario_builder, "MAX_CROWDING", 1e12)
     path = city(tmp_path / "city.geojson", *rings())
     with pytest.raises(VoleryError, match=why):
         toml_of("city", path, "yard", "yard.geojson")

@@ -106,7 +106,7 @@ def test_an_stl_that_is_no_text_does_not_ask_for_a_module(tmp_path):
 
 
 def test_a_wind_field_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeypatch):
-    monkeypatch.setattr("volery.world.weather.wind_field_files._MOST_BYTES", 1_000_000)
+    monkeypatch.setattr("volery.world.weather.wind_field_files._MAX_BYTES", 1_000_000)
     path = tmp_path / "bomb.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("velocity_m_s.npy", bytes(20_000_000))
@@ -209,7 +209,9 @@ class Late(Node):
 
 
 @pytest.mark.parametrize("name", ["Silent", "Late"])
-def test_a_node_without_super_init_is_told_the_line_to_add(flat_data, tmp_path, monkeypatch, name):
+def test_a_node_without_super_init_gets_an_error_with_the_line_to_add(
+    flat_data, tmp_path, monkeypatch, name
+):
     (tmp_path / "baseless.py").write_text(_BASELESS)
     monkeypatch.syspath_prepend(str(tmp_path))
     flat_data["types"]["f450"]["nodes"] = [{"node": f"baseless:{name}"}]
@@ -294,9 +296,9 @@ def test_a_header_given_twice_is_a_bad_request(simulate, flat_data, caplog, head
         )
         with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as client:
             client.sendall(request.encode())
-            answer = client.recv(4096)
-    assert answer.startswith(b"HTTP/1.1 400 ")
-    assert f"{header} is given more than once".encode() in answer
+            response = client.recv(4096)
+    assert response.startswith(b"HTTP/1.1 400 ")
+    assert f"{header} is given more than once".encode() in response
     assert "Traceback" not in caplog.text
 
 

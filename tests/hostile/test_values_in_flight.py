@@ -158,9 +158,11 @@ def test_hard_values_of_every_parameter_of_every_node(flown):
 
 def last_message(simulation, topic):
     """What is published on a topic in flight; a made-up message where nothing is."""
-    heard = []
-    listening = simulation.graph.subscribe(topic, lambda published: heard.append(published.message))
+    received = []
+    listening = simulation.graph.subscribe(
+        topic, lambda published: received.append(published.message)
+    )
     simulation.step(RATE_HZ // 5)
     listening.cancel()
     (msgtype,) = [found.msgtype for found in simulation.graph.topics() if found.name == topic]
-    return heard[-1] if heard else plausible(msgtype)
+    return received[-1] if received else plausible(msgtype)

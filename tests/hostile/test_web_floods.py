@@ -35,7 +35,7 @@ from volery.server.http_protocol import READ_BYTES
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
 from live_graph import LiveGraph
-from page_bench import ask, serving
+from page_bench import fetch, serving
 
 STALL_S = 1.0
 """A socket that takes nothing for so long takes no more."""
@@ -92,28 +92,28 @@ def plain(server):
 
 def upgraded(server):
     """A WebSocket connection of which nothing is read by itself."""
-    stranger = plain(server)
-    stranger.sendall(UPGRADE.format(port=server.port).encode())
-    answer = b""
-    while b"\r\n\r\n" not in answer:
-        answer += stranger.recv(4096)
-    assert answer.startswith(b"HTTP/1.1 101")
-    return stranger
+    client = plain(server)
+    client.sendall(UPGRADE.format(port=server.port).encode())
+    response = b""
+    while b"\r\n\r\n" not in response:
+        response += client.recv(4096)
+    assert response.startswith(b"HTTP/1.1 101")
+    return client
 
 
-def flood(stranger, piece, *, reads):
+def flood(client, piece, *, reads):
     """Bytes that the server, and the system, take of a flood; FLOOD_BYTES if all of them."""
-    stranger.setblocking(False)
+    client.setblocking(False)
     data, sent = piece * (1 + (1 << 16) // len(piece)), 0
     while sent < FLOOD_BYTES:
-        readable, writable, _ = select.select([stranger] if reads else [], [stranger], [], STALL_S)
+        readable, writable, _ = select.select([client] if reads else [], [client], [], STALL_S)
         if readable:
-            stranger.recv(1 << 20)
+            client.recv(1 << 20)
         elif not writable:
             break
         if writable:
             try:
-                sent += stranger.send(data)
+                sent += client.send(data)
             except ConnectionError:  # the server has ended the connection
                 break
     return sent
@@ -130,19 +130,19 @@ FLOODS = {
 @pytest.mark.parametrize("kind", FLOODS)
 def test_floods_of_frames_are_not_read(either, monkeypatch, kind, reads):
     monkeypatch.setattr(frame_limits, "FRAMES_PER_S", 10.0)  # a hold takes seconds
-    with upgraded(either) as stranger:
-        stranger.sendall(frame(Opcode.TEXT, fin=False))
-        assert flood(stranger, FLOODS[kind], reads=reads) < BUFFERS_BYTES
+    with upgraded(either) as client:
+        client.sendall(frame(Opcode.TEXT, fin=False))
+        assert flood(client, FLOODS[kind], reads=reads) < BUFFERS_BYTES
         assert serves(either)
     assert serves(either)
 
 
 def test_a_message_of_too_many_fragments_ends_the_connection(either):
-    with connect(f"ws://127.0.0.1:{either.port}/rosbridge") as stranger:
+    with connect(f"ws://127.0.0.1:{either.port}/rosbridge") as client:
         with suppress(ConnectionClosed):
-            stranger.send("x" for _ in range(MAX_FRAGMENTS + 2))
+            client.send("x" for _ in range(MAX_FRAGMENTS + 2))
         with pytest.raises(ConnectionClosed, match="fragments"):
-            stranger.recv(60.0)
+            client.recv(60.0)
 
 
 def test_honest_clients_ping_and_send_fragments(either):
@@ -209,43 +209,43 @@ def test_frames_are_counted_over_time():
     ],
 )
 def test_heads_of_requests_are_bounded(server, request_bytes):
-    with plain(server) as stranger:
+    with plain(server) as client:
         try:
-            stranger.sendall(request_bytes)
-            answer = stranger.recv(64)
+            client.sendall(request_bytes)
+            response = client.recv(64)
         except (ConnectionResetError, BrokenPipeError):
-            answer = b""
-        assert not answer or answer.split()[1].startswith(b"4")
-    assert ask(server, "/api/status").status == 200
+            response = b""
+        assert not response or response.split()[1].startswith(b"4")
+    assert fetch(server, "/api/status").status == 200
 
 
 def test_requests_behind_another_are_kept_in_small_numbers(server):
-    """The answers are not read, so the requests behind them have to wait in the system."""
+    """The responses are not read, so the requests behind them have to wait in the system."""
     request = f"GET /api/status HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode()
-    with plain(server) as stranger:
-        assert flood(stranger, request, reads=False) < BUFFERS_BYTES
-        assert ask(server, "/api/status").status == 200
+    with plain(server) as client:
+        assert flood(client, request, reads=False) < BUFFERS_BYTES
+        assert fetch(server, "/api/status").status == 200
     assert READ_BYTES < 1 << 17
 
 
-def test_silent_and_halting_requests_keep_nobody_out(server):
+def test_silent_and_halting_requests_keep_no_client_out(server):
     heads = (b"", b"G", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n", b"POST /api/upload HTTP/1.1\r\n")
-    with ExitStack() as strangers:
+    with ExitStack() as clients:
         for number in range(4 * MAX_UNPROVEN):
-            stranger = strangers.enter_context(closing(plain(server)))
-            stranger.sendall(heads[number % len(heads)])
-        assert ask(server, "/api/status").status == 200
+            client = clients.enter_context(closing(plain(server)))
+            client.sendall(heads[number % len(heads)])
+        assert fetch(server, "/api/status").status == 200
 
 
 def test_a_huge_frame_is_refused_by_its_length(server):
-    with upgraded(server) as stranger:
-        stranger.sendall(b"\x82\xff" + struct.pack(">Q", 1 << 40) + bytes(4))
-        assert b"\x03\xf1" in stranger.recv(4096)  # 1009
+    with upgraded(server) as client:
+        client.sendall(b"\x82\xff" + struct.pack(">Q", 1 << 40) + bytes(4))
+        assert b"\x03\xf1" in client.recv(4096)  # 1009
 
 
 def test_text_that_is_no_utf_8_ends_the_connection_quietly(server, caplog):
     for _ in range(3):
-        with upgraded(server) as stranger:
-            stranger.sendall(frame(Opcode.TEXT, b"\xff\xfe" + os.urandom(8)))
-            assert stranger.recv(4096)
+        with upgraded(server) as client:
+            client.sendall(frame(Opcode.TEXT, b"\xff\xfe" + os.urandom(8)))
+            assert client.recv(4096)
     assert "Traceback" not in caplog.text

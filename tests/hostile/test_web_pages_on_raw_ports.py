@@ -1,4 +1,4 @@
-"""A web page of a stranger sends HTTP or TLS to ports that speak binary protocols.
+"""A foreign web page sends HTTP or TLS to ports that speak binary protocols.
 
 `fetch('http://127.0.0.1:PORT', {method: 'POST', mode: 'no-cors', body})` puts bytes of the page's
 choice behind an HTTP head; parsers that search for frames would find them.
@@ -32,7 +32,7 @@ from volery.mavlink.codec import dialect
 from volery.mavlink.hil.px4_bridge import Px4Bridge
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 
-PATIENCE_S = 600.0
+TIMEOUT_S = 600.0
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "CONNECT", "OPTIONS", "TRACE", "PATCH")
 HELLO_OF_TLS = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"
 
@@ -88,9 +88,9 @@ class Graph:
     def __init__(self):
         self.live = LiveGraph()
         self.live.graph.advertise("/uav1/imu", "sensor_msgs/msg/Imu")
-        self.heard = []
+        self.received = []
         for topic, kind in (("/uav1/pose_command", m.PoseStamped), ("/in", m.String)):
-            subscribe = partial(self.live.graph.subscribe, topic, self.heard.append, kind)
+            subscribe = partial(self.live.graph.subscribe, topic, self.received.append, kind)
             self.live.do(subscribe)
         self.bridges = BridgeHost(self.live.gateway)
         self._held = contextlib.ExitStack()
@@ -128,7 +128,7 @@ class Comms:
         self._do(self.server.start())
 
     def _do(self, work):
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(PATIENCE_S)
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(TIMEOUT_S)
 
     def close(self):
         self._do(self.server.stop())
@@ -180,7 +180,7 @@ NAMES = ("comms", "mavlink_tcp", "ros_tcp", "px4", "sensor_link", "sensor_link_i
 
 def is_ended(sock):
     """Whether the server ends the connection; what it still says is passed over."""
-    sock.settimeout(PATIENCE_S)
+    sock.settimeout(TIMEOUT_S)
     with contextlib.suppress(ConnectionError):
         while sock.recv(65536):
             pass
@@ -202,7 +202,7 @@ def test_a_page_that_posts_a_frame_is_sent_away(graph, comms, caplog, name, at_o
                     sock.sendall(bytes((byte,)))
         assert is_ended(sock)
     graph.live.do(lambda: None)
-    assert graph.heard == []
+    assert graph.received == []
     if name == "comms":
         assert comms.router.stations() == {}
     assert any("HTTP" in record.message for record in caplog.records)

@@ -1,4 +1,4 @@
-"""A web page of a stranger posts XML-RPC to the port of our ROS 1 node."""
+"""A foreign web page posts XML-RPC to the port of our ROS 1 node."""
 
 import http.client
 import threading

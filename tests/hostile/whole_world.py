@@ -1,4 +1,4 @@
-"""A simulation that offers every service there is, and clients that ask it for nasty things."""
+"""A simulation that offers every service there is, and clients that send it hostile requests."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ PLANNING = [
 
 
 def whole_data(folder):
-    """Scenario data: two UAVs that fly by themselves, a kinematic one, things, blocks, radios."""
+    """Scenario data: two UAVs that fly by themselves, a kinematic one, actors, blocks, radios."""
     blocks = folder / "blocks.csv"
     blocks.write_text("0,0,1\n0,0,0\n")
     walker = {"kind": "external", "position_m": [0.0, 30.0]}
@@ -94,18 +94,18 @@ def whole_data(folder):
 
 
 class Client:
-    """A session whose answers are kept."""
+    """A session that collects its responses."""
 
     def __init__(self, simulation, name="stranger"):
         self.simulation = simulation
         self.session = simulation.gateway.open(name)
 
     def call(self, service, request):
-        """The answer of a service after a step, as a response or an error; None: there is none."""
-        answers = []
-        self.session.call(service, request, ServiceReply(answers.append, answers.append))
+        """The response of a service after a step, or an error; None: there is none."""
+        responses = []
+        self.session.call(service, request, ServiceReply(responses.append, responses.append))
         self.simulation.process_commands()
-        return answers[0] if answers else None
+        return responses[0] if responses else None
 
     def publish(self, topic, message):
         self.session.advertise(topic, message.__msgtype__)

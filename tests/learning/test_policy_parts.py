@@ -149,7 +149,7 @@ GATES = [[4.0, 0.0, 2.0, 0.0], [8.0, 0.0, 2.0, math.pi / 2], [8.0, 4.0, 2.0, 0.0
 
 
 @pytest.mark.parametrize(
-    ("way", "passed"),
+    ("path", "passed"),
     [
         ([[3.0, 0.0, 2.0], [5.0, 0.0, 2.0]], 1),
         ([[5.0, 0.0, 2.0], [3.0, 0.0, 2.0]], 0),  # backwards
@@ -158,10 +158,10 @@ GATES = [[4.0, 0.0, 2.0, 0.0], [8.0, 0.0, 2.0, math.pi / 2], [8.0, 4.0, 2.0, 0.0
         ([[3.0, 0.0, 2.0], [5.0, 0.0, 2.0], [8.0, -1.0, 2.0], [8.0, 1.0, 2.0]], 2),
     ],
 )
-def test_the_node_passes_gates_in_order_and_in_their_direction(way, passed):
+def test_the_node_passes_gates_in_order_and_in_their_direction(path, passed):
     bench = NodeBench()
     source = _gates_node(bench, gates=GATES)
-    for k, position in enumerate(way):
+    for k, position in enumerate(path):
         bench.send("/uav1/odom", odometry(k, position))
     ahead = [GATES[min(passed + k, 2)] for k in range(2)]
     np.testing.assert_allclose(source.ahead(2), ahead)

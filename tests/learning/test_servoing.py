@@ -107,8 +107,8 @@ def test_rendered_images_agree_with_the_model(camera):
     for height in (1.2, 3.0):
         poses = above(height, seed=5)
         view = camera.view(*poses)
-        pictures = images.render(envs, *poses, keys=envs.astype(np.uint64))
-        found = images.detect(pictures)
+        rendered = images.render(envs, *poses, keys=envs.astype(np.uint64))
+        found = images.detect(rendered)
         assert found.is_detected[view.is_whole].all()
         assert view.is_whole.sum() > K // 2
         rows = np.flatnonzero(view.is_whole)
@@ -164,7 +164,7 @@ def test_only_a_soft_touchdown_near_the_tag_succeeds(episodes):
     assert landing.touchdown_speed(1.0).function(flight)[0, 0] == pytest.approx(0.9)
 
 
-def test_shaping_adds_up_to_the_way(episodes):
+def test_shaping_adds_up_to_the_distance(episodes):
     flight = episodes.flight
     start = np.linalg.norm(flight.values[landing.MOTION][:, 0, 6:9], axis=1)
     action = np.zeros((K, 1, 4))

@@ -231,7 +231,7 @@ def test_a_touch_between_decisions_is_found():
     episodes.close()
 
 
-def test_posts_are_apart_and_anew_in_each_episode():
+def test_posts_are_apart_and_new_in_each_episode():
     episodes = Episodes(replace(load_task("formation"), curriculum=None), 4, threads=1)
     episodes.begin(np.arange(4))
     first = episodes.flight.values[POSTS].copy()
@@ -294,14 +294,14 @@ def test_a_straight_chase_catches_some_evaders():
 def test_the_evader_flees_and_stays_inside():
     env = TaskVectorEnv(load_task("pursuit"), 8)
     env.reset(seed=0)
-    flight, fastest, farthest = env.episodes.flight, 0.0, 0.0
+    flight, fastest, max_distance = env.episodes.flight, 0.0, 0.0
     for _ in range(150):
         env.step(straight_chase(flight).reshape(env.num_envs, 3))
         own = flight.state.position_map[:, EVADER]
-        farthest = max(farthest, np.linalg.norm(own[:, :2], axis=1).max())
+        max_distance = max(max_distance, np.linalg.norm(own[:, :2], axis=1).max())
         velocity = flight.state.velocity_map[:, EVADER]
         fastest = max(fastest, np.linalg.norm(velocity, axis=1).max())
         assert (np.abs(own[:, 2] - 10.0) < 1.0).all()
-    assert farthest < 13.5
+    assert max_distance < 13.5
     assert 3.4 < fastest < 4.2
     env.close()

@@ -28,7 +28,7 @@ def episodes():
         each.close()
 
 
-def place(episodes, position, attitude=(0.0, 0.0, 0.0, 1.0)):
+def put(episodes, position, attitude=(0.0, 0.0, 0.0, 1.0)):
     episodes.envs.reset(start=EnvironmentStart(position, attitude))
     episodes.flight.refresh()
 
@@ -56,7 +56,7 @@ def test_uavs_start_on_the_curve_and_points_ahead_are_in_the_body_frame(episodes
     speed = np.abs(curve[:, 1] * curve[:, 2])
     assert ((speed[:, :2] >= 1.5) & (speed[:, :2] <= 3.5)).all()
     turned = rotations.from_rpy(0.0, 0.0, np.pi / 2.0)
-    place(own, goal, turned)
+    put(own, goal, turned)
     ahead = trajectories.reference_ahead((0.0, 0.2)).function(flight)
     np.testing.assert_allclose(ahead[..., :3], 0.0, atol=1e-12)
     points, _ = trajectories.curve_motion(curve, np.full((2, 1), 0.2))
@@ -73,7 +73,7 @@ def test_the_mean_error_counts_after_the_first_second(episodes):
         flight.decisions[:] = decision
         time = np.full((2, 1), decision / 50.0)
         point, _ = trajectories.curve_motion(flight.values["curve"], time)
-        place(own, point + apart * (1.0 if decision > 50 else 9.0))
+        put(own, point + apart * (1.0 if decision > 50 else 9.0))
         trajectories.follow(flight)
     np.testing.assert_allclose(flight.values["goal_map"], point)
     np.testing.assert_allclose(trajectories.mean_error(flight), 0.5)
@@ -100,7 +100,7 @@ def move(own, before, after):
     """Moves the UAVs between two decisions; returns passed gates and hit frames (K,)."""
     values = own.flight.values
     values["last_position_map"][:] = before
-    place(own, np.broadcast_to(after, (2, 1, 3)))
+    put(own, np.broadcast_to(after, (2, 1, 3)))
     Race(Frame())(own.flight)
     return values["passed_gate"][:, 0].tolist(), values["frame_hit"][:, 0].tolist()
 
@@ -143,7 +143,7 @@ def test_progress_is_towards_the_next_gate(episodes):
 
 def test_gates_are_seen_in_the_heading_frame(episodes):
     own = course(episodes)
-    place(own, [4.0, -2.0, 2.0], rotations.from_rpy(0.0, 0.3, np.pi / 2.0))
+    put(own, [4.0, -2.0, 2.0], rotations.from_rpy(0.0, 0.3, np.pi / 2.0))
     seen = gates.gates_heading(2).function(own.flight)[0, 0]
     np.testing.assert_allclose(seen, [2.0, 0.0, 0.0, 2.0, -4.0, 0.0], atol=1e-12)
     directions = gates.gate_directions_heading(2).function(own.flight)[0, 0]
@@ -153,11 +153,11 @@ def test_gates_are_seen_in_the_heading_frame(episodes):
 def test_courses_are_drawn_within_their_bounds(episodes):
     own = episodes("gates")
     layout = own.flight.values["gates"]
-    way = np.diff(np.insert(layout[..., :2], 0, 0.0, axis=1), axis=1)
-    length = np.linalg.norm(way, axis=-1)
+    steps = np.diff(np.insert(layout[..., :2], 0, 0.0, axis=1), axis=1)
+    length = np.linalg.norm(steps, axis=-1)
     assert ((length >= 4.0) & (length <= 6.0)).all()
     assert (np.abs(layout[..., 2] - 4.0) <= 0.7).all()
-    heading = np.arctan2(way[..., 1], way[..., 0])
+    heading = np.arctan2(steps[..., 1], steps[..., 0])
     turn = np.angle(np.exp(1j * np.diff(heading, axis=1)))
     assert (np.abs(turn) <= np.radians(45.0) + 1e-9).all()
     facing = np.angle(np.exp(1j * (layout[..., 3] - heading)))

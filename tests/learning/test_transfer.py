@@ -19,13 +19,13 @@ def policy(tmp_path_factory):
 
 
 def test_episodes_end_as_those_of_the_task(policy):
-    told = []
+    outcomes = []
     result = fly_transfer(
-        policy, load_task("homing"), episodes=2, on_episode=lambda *news: told.append(news)
+        policy, load_task("homing"), episodes=2, on_episode=lambda *news: outcomes.append(news)
     )
     assert result.ends == {"arrived": 2}
     assert result.success == 1.0
-    assert told == [(1, True), (2, True)]
+    assert outcomes == [(1, True), (2, True)]
 
 
 def test_the_policy_sees_an_estimate_late(policy):

@@ -149,7 +149,7 @@ def test_innovations_are_as_large_as_predicted(flight):
         assert low < values.mean() < high
 
 
-def test_an_outage_is_told_and_recovered_from(flight):
+def test_an_outage_widens_the_covariance_and_is_recovered_from(flight):
     _, seen, before, jumps = flight
     sigma_x = seen["sigmas"][:, 0]
     assert (np.diff(sigma_x[31:90]) > 0).all()  # it grows without bound ...
@@ -193,8 +193,8 @@ class HardLanding(Straight):
         position, velocity, level, omega, force = super().at(t)
         stopped = np.clip((t - self.AT) / self.LASTS, 0.0, 1.0)
         velocity[:, 2] = -self.SPEED * (1.0 - stopped)
-        way = min(t, self.AT) + self.LASTS * (stopped - 0.5 * stopped**2)
-        position[:, 2] = -self.SPEED * way
+        distance = min(t, self.AT) + self.LASTS * (stopped - 0.5 * stopped**2)
+        position[:, 2] = -self.SPEED * distance
         if 0.0 < stopped < 1.0:
             force[:, 2] += self.SPEED / self.LASTS
         return position, velocity, level, omega, force
@@ -212,9 +212,9 @@ class Saturated(Sensors):
 
 def test_a_shock_beyond_full_scale_is_doubted_and_corrected():
     """It hides 3 m/s. A filter that knows the full scale doubts its velocity, and takes fixes."""
-    told = SETTINGS.model_copy(update={"accel_range_m_s2": Saturated.FULL_SCALE})
+    aware = SETTINGS.model_copy(update={"accel_range_m_s2": Saturated.FULL_SCALE})
     ratios, refused = [], []
-    for settings in (told, SETTINGS):
+    for settings in (aware, SETTINGS):
         motion = HardLanding(8, 0.0)
         sensors = Saturated(motion, settings, seed=15)
         estimator = airborne(motion, seed=16, settings=settings, mounting=Mounting())

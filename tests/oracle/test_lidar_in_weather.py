@@ -1,6 +1,6 @@
 """Statistics of LIDARs in rain, snow, fog and dust against the formulas, integrated by scipy.
 
-Nothing of the code under test is used to tell what is expected but the numbers of the model file:
+What is expected uses nothing of the code under test but the numbers of the model file:
 `Expected` writes the formulas of `docs/weather.md` out once more.
 """
 
@@ -46,7 +46,9 @@ class Expected:
     def __post_init__(self):
         m, p = self.model, self.particles
         self.a, self.far = extinction(p), m.range.max_m
-        self.reach = optimize.brentq(lambda r: r * np.exp(self.a * r) - self.far, 1e-6, self.far)
+        self.max_range_m = optimize.brentq(
+            lambda r: r * np.exp(self.a * r) - self.far, 1e-6, self.far
+        )
         self.length = m.mixed_pixels.pulse_length_m
 
     def mean(self, r):
@@ -56,7 +58,7 @@ class Expected:
         weak = np.exp(-2 * self.a * r) / 0.9
         return np.pi * beta * self.length * weak * (self.far / (r + 1.0)) ** 2
 
-    def least(self, r):
+    def min_diameter_mm(self, r):
         """Diameter of the smallest grain that is noticed, mm."""
         front = (0.328 / 2.328) ** 2
         back = front * (1 - front) ** 2 * (1.328 / 0.672) ** 2
@@ -76,22 +78,22 @@ class Expected:
         if self.particles.rain_mm_h or self.particles.snow_mm_h:
             number = self.a * 1e6 * self.slope**3 / np.pi
             area = np.pi / 4 * (0.005 + self.model.mixed_pixels.divergence_rad * r) ** 2
-            return area * number / self.slope * np.exp(-self.slope * self.least(r))
+            return area * number / self.slope * np.exp(-self.slope * self.min_diameter_mm(r))
         return np.exp(-1 / self.mean(r)) / self.length
 
     def events(self, r):
         """Mean number before range r."""
         return integrate.quad(self.rate, self.model.range.min_m, r, limit=200)[0]
 
-    def share_noticed(self, r, behind):
-        """Share of the echoes from r that are noticed before a surface of strength `behind`."""
-        share = self.model.mixed_pixels.first_echo_share
-        least = share / (1 - share) * behind
-        if least <= 1:
+    def noticed_fraction(self, r, behind):
+        """Fraction of the echoes from r that are noticed before a surface of strength `behind`."""
+        fraction = self.model.mixed_pixels.first_echo_share
+        min_strength = fraction / (1 - fraction) * behind
+        if min_strength <= 1:
             return 1.0
         if self.particles.rain_mm_h or self.particles.snow_mm_h:
-            return np.exp(-self.slope * self.least(r) * (np.sqrt(least) - 1))
-        return np.exp(-(least - 1) / self.mean(r))
+            return np.exp(-self.slope * self.min_diameter_mm(r) * (np.sqrt(min_strength) - 1))
+        return np.exp(-(min_strength - 1) / self.mean(r))
 
 
 SURE = {
@@ -108,10 +110,10 @@ def first_noticed():
 
 
 def strongest():
-    """One of longer reach that reports the strongest."""
+    """One of longer range that reports the strongest."""
     mixed = {"divergence_rad": 3e-3, "pulse_length_m": 0.9, "first_echo_share": 0.5}
-    reach = {"min_m": 0.5, "max_m": 100.0, "resolution_m": 1e-6}
-    return load_lidar("utm_30lx").changed(**{**SURE, "mixed_pixels": mixed, "range": reach})
+    ranges = {"min_m": 0.5, "max_m": 100.0, "resolution_m": 1e-6}
+    return load_lidar("utm_30lx").changed(**{**SURE, "mixed_pixels": mixed, "range": ranges})
 
 
 KINDS = pytest.mark.parametrize("make", [first_noticed, strongest])
@@ -130,27 +132,27 @@ def measured(model, particles, surface=None, **options):
 @KINDS
 @WEATHERS
 def test_false_echoes_in_the_open(make, particles):
-    """Their share, and the distribution of their ranges, against the Poisson process."""
+    """Their fraction, and the distribution of their ranges, against the Poisson process."""
     model = make()
     expected = Expected(model, particles)
     ranges = measured(model, particles).ranges.astype(float).ravel()
     seen = ranges[np.isfinite(ranges)]
-    share = 1.0 - np.exp(-expected.events(expected.reach))
+    fraction = 1.0 - np.exp(-expected.events(expected.max_range_m))
     assert len(seen) / len(ranges) == pytest.approx(
-        share, abs=4.0 * np.sqrt(share * (1 - share) / len(ranges)) + 1e-6
+        fraction, abs=4.0 * np.sqrt(fraction * (1 - fraction) / len(ranges)) + 1e-6
     )
     if len(seen) < 100:
-        assert share < 0.005  # too few for a distribution
+        assert fraction < 0.005  # too few for a distribution
         return
-    grid = np.linspace(model.range.min_m, expected.reach, 300)
-    below = np.interp(seen, grid, [1.0 - np.exp(-expected.events(r)) for r in grid]) / share
+    grid = np.linspace(model.range.min_m, expected.max_range_m, 300)
+    below = np.interp(seen, grid, [1.0 - np.exp(-expected.events(r)) for r in grid]) / fraction
     assert stats.kstest(below, "uniform").pvalue > 1e-3
 
 
 @KINDS
 @WEATHERS
 def test_false_echoes_before_a_wall(make, particles):
-    """Share of beams whose wall is hidden by a false echo."""
+    """Fraction of beams whose wall is hidden by a false echo."""
     model, distance = make(), 6.0
     expected = Expected(model, particles)
     ranges = measured(model, particles, distance).ranges.astype(float).ravel()
@@ -158,24 +160,24 @@ def test_false_echoes_before_a_wall(make, particles):
 
     def hides(r):
         first = expected.rate(r) * np.exp(-expected.events(r))
-        return first * expected.share_noticed(r, behind)
+        return first * expected.noticed_fraction(r, behind)
 
     before = distance - expected.length
-    share = integrate.quad(hides, model.range.min_m, before, limit=100, epsrel=1e-4)[0]
+    fraction = integrate.quad(hides, model.range.min_m, before, limit=100, epsrel=1e-4)[0]
     found = (ranges < before + 0.01).mean()
     assert found == pytest.approx(
-        share, abs=4.0 * np.sqrt(share * (1 - share) / len(ranges)) + 1e-5
+        fraction, abs=4.0 * np.sqrt(fraction * (1 - fraction) / len(ranges)) + 1e-5
     )
     np.testing.assert_allclose(ranges[ranges > before + 0.01], distance, atol=1e-3)
 
 
 @WEATHERS
-def test_reach_shrinks_to_where_the_echo_is_as_weak_as_at_full_reach(particles):
+def test_range_shrinks_to_where_the_echo_is_as_weak_as_at_full_range(particles):
     model = first_noticed().without_noise()
-    reach = Expected(model, particles).reach
-    assert reach < 0.95 * model.range.max_m
-    assert np.isfinite(measured(model, particles, 0.998 * reach).ranges).all()
-    assert np.isinf(measured(model, particles, 1.002 * reach).ranges).all()
+    max_range_m = Expected(model, particles).max_range_m
+    assert max_range_m < 0.95 * model.range.max_m
+    assert np.isfinite(measured(model, particles, 0.998 * max_range_m).ranges).all()
+    assert np.isinf(measured(model, particles, 1.002 * max_range_m).ranges).all()
 
 
 @pytest.mark.parametrize("distance", [8.0, 12.0, 16.0])
@@ -185,9 +187,9 @@ def test_dropouts_over_the_range(distance):
     particles = Particles(fog_visibility_m=100.0)
     alike = distance * np.exp(extinction(particles) * distance) / model.range.max_m
     ranges = measured(model, particles, distance).ranges
-    share = 0.5 * alike**2
+    fraction = 0.5 * alike**2
     assert np.isinf(ranges).mean() == pytest.approx(
-        share, abs=4.0 * np.sqrt(share * (1 - share) / ranges.size)
+        fraction, abs=4.0 * np.sqrt(fraction * (1 - fraction) / ranges.size)
     )
 
 

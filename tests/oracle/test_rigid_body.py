@@ -1,6 +1,6 @@
 """The compiled plant against the equations of motion, integrated by scipy with tight tolerances.
 
-The right-hand side below is written anew from the published equations (rotor model of RotorS and
+The right-hand side below is written from the published equations (rotor model of RotorS and
 PX4, Newton-Euler), shares no code with the plant and is solved by DOP853 at 1e-11.
 """
 
@@ -48,9 +48,9 @@ def right_hand_side(airframe, reference, wind, wear=None, ground=None):
         air = turn.T @ (v - wind)
         force = -0.5 * RHO * area * np.linalg.norm(air) * air
         torque = np.zeros(3)
-        for place, w, old in zip(rotors.places, speeds, wear, strict=True):
-            axis, arm = np.array(place.axis), np.array(place.position_m)
-            sense = {"ccw": 1.0, "cw": -1.0}[place.direction]
+        for rotor, w, old in zip(rotors.places, speeds, wear, strict=True):
+            axis, arm = np.array(rotor.axis), np.array(rotor.position_m)
+            sense = {"ccw": 1.0, "cw": -1.0}[rotor.direction]
             hub = air + np.cross(omega, arm)
             along = hub @ axis
             across = hub - along * axis

@@ -79,9 +79,9 @@ def module_browsing(chromium):
 def shared(module_browsing):
     """A module's own pages: opening one costs seconds, and these tests do not need a fresh one."""
     yield module_browsing
-    complaints = module_browsing.unexpected()
+    problems = module_browsing.unexpected()
     module_browsing.tidy()
-    assert complaints == []
+    assert problems == []
 
 
 @pytest.fixture

@@ -56,8 +56,8 @@ def message(topic, kind):
         case "String":
             return {"data": "\n".join(texts)}
         case "CommandRecord":
-            said = {"client": TEXTS[0], "kind": "refused", "name": TEXTS[1], "content": LONG}
-            return {"stamp": stamp} | said
+            fields = {"client": TEXTS[0], "kind": "refused", "name": TEXTS[1], "content": LONG}
+            return {"stamp": stamp} | fields
         case "VehicleStates":
             return {"vehicles": [vehicle(text, zero) for text in texts]}
         case "TFMessage":
@@ -88,12 +88,12 @@ def message(topic, kind):
             return {"header": header, "encoding": TEXTS[0], "data": TEXTS[0]}
 
 
-def vehicle(name, place):
+def vehicle(name, position):
     """State of a UAV of this name."""
     texts = {"name": name, "airframe": name, "type": name, "mode": name, "operator": name}
     figures = {"battery": 0.5, "voltage": 11.1, "rotor_speed": 1.0, "command_age": -1.0}
     flags = {"airborne": True, "crashed": False}
-    return texts | figures | flags | {"position": place, "velocity": place}
+    return texts | figures | flags | {"position": position, "velocity": position}
 
 
 @contextmanager
@@ -111,52 +111,56 @@ def hostile_robot():
 
 def _talk(socket):
     wanted, ends = {}, threading.Event()
-    teller = threading.Thread(target=_tell, args=(socket, wanted, ends))
-    teller.start()
+    publisher = threading.Thread(target=_publish, args=(socket, wanted, ends))
+    publisher.start()
     try:
         for text in socket:
-            asked = json.loads(text)
-            if asked["op"] == "subscribe":
-                wanted[asked["topic"]] = asked.get("type") or "std_msgs/msg/String"
-            elif asked["op"] == "unsubscribe":
-                wanted.pop(asked["topic"], None)
-            elif asked["op"] == "call_service":
-                socket.send(json.dumps(_answer(asked)))
+            operation = json.loads(text)
+            if operation["op"] == "subscribe":
+                wanted[operation["topic"]] = operation.get("type") or "std_msgs/msg/String"
+            elif operation["op"] == "unsubscribe":
+                wanted.pop(operation["topic"], None)
+            elif operation["op"] == "call_service":
+                socket.send(json.dumps(_respond(operation)))
     finally:
         ends.set()
-        teller.join()
+        publisher.join()
 
 
-def _tell(socket, wanted, ends):
-    known, told_once = topics(), set()
+def _publish(socket, wanted, ends):
+    known, sent_once = topics(), set()
     while not ends.wait(SENT_S):
-        for topic in [name for name in list(wanted) if name in known and name not in told_once]:
+        for topic in [name for name in list(wanted) if name in known and name not in sent_once]:
             if topic == "/events":  # a notification of each
-                told_once.add(topic)
-            told = {"op": "publish", "topic": topic, "msg": message(topic, known[topic])}
+                sent_once.add(topic)
+            operation = {"op": "publish", "topic": topic, "msg": message(topic, known[topic])}
             try:
-                socket.send(json.dumps(told))
+                socket.send(json.dumps(operation))
             except ConnectionClosed:
                 return
 
 
-def _answer(asked):
-    answer = {"op": "service_response", "service": asked["service"], "id": asked.get("id")}
-    match asked["service"]:
+def _respond(operation):
+    response = {
+        "op": "service_response",
+        "service": operation["service"],
+        "id": operation.get("id"),
+    }
+    match operation["service"]:
         case "/rosapi/topics":
             known = topics()
-            return answer | {
+            return response | {
                 "result": True,
                 "values": {"topics": list(known), "types": list(known.values())},
             }
         case "/rosapi/services":
             services = [f"/{text}/service" for text in (*TEXTS, LONG)]
-            return answer | {"result": True, "values": {"services": services}}
+            return response | {"result": True, "values": {"services": services}}
         case "/rosapi/service_type":
-            return answer | {"result": True, "values": {"type": f"{TEXTS[0]}/srv/{TEXTS[1]}"}}
+            return response | {"result": True, "values": {"type": f"{TEXTS[0]}/srv/{TEXTS[1]}"}}
         case "/rosapi/get_time":
             now = time.time()
             stamp = {"sec": int(now), "nanosec": 0}
-            return answer | {"result": True, "values": {"time": stamp}}
+            return response | {"result": True, "values": {"time": stamp}}
         case _:
-            return answer | {"result": False, "values": f"{TEXTS[0]} {TEXTS[1]} {LONG}"}
+            return response | {"result": False, "values": f"{TEXTS[0]} {TEXTS[1]} {LONG}"}

@@ -19,16 +19,16 @@ def map_canvas(page):
 
 def red_circle(page):
     """(x, y) the middle of the red circle, CSS pixels of the map; None: there is none."""
-    picture = Image.open(io.BytesIO(map_canvas(page).screenshot())).convert("RGB")
-    red, green, blue = np.moveaxis(np.asarray(picture, dtype=int), 2, 0)
+    image = Image.open(io.BytesIO(map_canvas(page).screenshot())).convert("RGB")
+    red, green, blue = np.moveaxis(np.asarray(image, dtype=int), 2, 0)
     mask = (red > 190) & (green < 125) & (blue < 125)
     angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     score = np.zeros(mask.shape)
     for angle in angles:
         dx, dy = np.rint(RING_PX * np.array([np.cos(angle), np.sin(angle)])).astype(int)
         score += np.roll(mask, (dy, dx), axis=(0, 1))
-    share = score / len(angles)
-    if share.max() < CLOSED:
+    fraction = score / len(angles)
+    if fraction.max() < CLOSED:
         return None
-    rows, columns = np.nonzero(share > share.max() - 0.05)
+    rows, columns = np.nonzero(fraction > fraction.max() - 0.05)
     return np.array([columns.mean(), rows.mean()])

@@ -1,11 +1,11 @@
-"""Pages of a test, which must not complain, and their pictures."""
+"""Pages of a test, which must not log errors, and their screenshots."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-PICTURES = Path(__file__).parents[2] / "runs" / "page"
+SCREENSHOTS = Path(__file__).parents[2] / "runs" / "page"
 """Screenshots of the tests, to be looked at."""
 HANG_S = 600.0
 """No measure of anything: a machine with other work may take so long over a click."""
@@ -56,14 +56,14 @@ class Browsing:
     def __init__(self, chromium):
         self._chromium = chromium
         self._contexts = []
-        self.complaints = []
+        self.problems = []
         self.expected = []
-        """Patterns of complaints that belong to the test."""
+        """Patterns of console errors that belong to the test."""
 
     def open(self, url, *, viewport=None, init_script=None, **context):
         """Open a page and wait until it stands; `init_script` runs in it before its own scripts.
 
-        Whoever names no quality looks at no picture: it is drawn as cheaply as can be.
+        Tests that name no quality look at no pixels: the scene is drawn as cheaply as can be.
         """
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
         opened.set_default_timeout(1000 * HANG_S)
@@ -75,19 +75,19 @@ class Browsing:
         if init_script is not None:
             opened.add_init_script(init_script)
         page = opened.new_page()
-        page.on("console", self._hear)
-        page.on("pageerror", lambda error: self.complaints.append(f"uncaught: {error}"))
+        page.on("console", self._on_console)
+        page.on("pageerror", lambda error: self.problems.append(f"uncaught: {error}"))
         page.goto(url)
         page.locator(".page").wait_for()
         return page
 
-    def _hear(self, message):
+    def _on_console(self, message):
         if message.type == "error":
-            self.complaints.append(f"{message.text} ({message.location.get('url', '')})")
+            self.problems.append(f"{message.text} ({message.location.get('url', '')})")
 
     def unexpected(self):
         allowed = re.compile("|".join([*HARMLESS, *self.expected]))
-        return [complaint for complaint in self.complaints if not allowed.search(complaint)]
+        return [problem for problem in self.problems if not allowed.search(problem)]
 
     def tidy(self):
         """Close what floats over the pages, so that the next test finds them as this one did."""
@@ -95,7 +95,7 @@ class Browsing:
             for page in context.pages:
                 page.keyboard.press("Escape")
                 page.keyboard.press("Escape")
-        self.complaints.clear()
+        self.problems.clear()
         self.expected.clear()
 
     def close(self):
@@ -108,9 +108,9 @@ def with_fragment(url, parameter):
     return f"{url}{'&' if '#' in url else '#'}{parameter}"
 
 
-def keep_picture(page, name):
+def save_screenshot(page, name):
     """Screenshot under runs/page/; returns its path."""
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    path = PICTURES / f"{name}.png"
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    path = SCREENSHOTS / f"{name}.png"
     page.screenshot(path=path)
     return path

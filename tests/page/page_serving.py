@@ -1,4 +1,4 @@
-"""A simulation with its page in a process of its own, and a client that asks it what is true."""
+"""A simulation with its page in a process of its own, and a client that reads its state."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import roslibpy
 
 from volery_benchmarks.page.serving import PageProcess
 
-ANSWER_S = 600.0
+RESPONSE_TIMEOUT_S = 600.0
 
 
 class Served(PageProcess):
     """`volery serve SCENARIO`, for as long as the test lasts; `ros` sees its graph.
 
-    token: the pilots', where one is demanded.
+    token: the operators', where one is demanded.
     """
 
     def __init__(self, scenario="hover", *options, port=0, token=None):
@@ -28,33 +28,33 @@ class Served(PageProcess):
 
     @property
     def rosbridge(self):
-        """Of the graph, as a pilot."""
+        """A client of the graph, as an operator."""
         return super().rosbridge + self._query
 
-    def ask(self, path, query=None):
-        """What an address below `./api/` answers to a pilot, or to who asks with `query`."""
+    def fetch(self, path, query=None):
+        """The response of an address below `./api/` to an operator, or to a client with `query`."""
         url = f"{self.url}api/{path}{self._query if query is None else query}"
-        with urllib.request.urlopen(url, timeout=ANSWER_S) as answer:
-            return answer.read()
+        with urllib.request.urlopen(url, timeout=RESPONSE_TIMEOUT_S) as response:
+            return response.read()
 
     def status(self):
         """What `./api/status` says."""
-        return json.loads(self.ask("status"))
+        return json.loads(self.fetch("status"))
 
     @property
     def ros(self):
         """An ordinary roslibpy client beside the page."""
         if self._ros is None or not self._ros.is_connected:
             self._ros = roslibpy.Ros(self.rosbridge)
-            self._ros.run(timeout=ANSWER_S)
+            self._ros.run(timeout=RESPONSE_TIMEOUT_S)
         return self._ros
 
     def call(self, service, srvtype, request=None):
         """Answer of a service, as a dict."""
         client = roslibpy.Service(self.ros, service, srvtype)
-        return dict(client.call(roslibpy.ServiceRequest(request or {}), timeout=ANSWER_S))
+        return dict(client.call(roslibpy.ServiceRequest(request or {}), timeout=RESPONSE_TIMEOUT_S))
 
-    def once(self, topic, msgtype, fits=lambda _: True, timeout_s=ANSWER_S):
+    def once(self, topic, msgtype, fits=lambda _: True, timeout_s=RESPONSE_TIMEOUT_S):
         """The first message of a topic that fits."""
         arrived, fitting = threading.Event(), []
 
@@ -72,7 +72,7 @@ class Served(PageProcess):
         return fitting[0]
 
     @contextmanager
-    def heard(self, topic, msgtype):
+    def collect(self, topic, msgtype):
         """List of the messages of a topic from before the block on: none is too late for it."""
         messages, began = [], threading.Event()
 
@@ -83,7 +83,7 @@ class Served(PageProcess):
         subscriber = roslibpy.Topic(self.ros, topic, msgtype)
         subscriber.subscribe(take)
         try:
-            assert began.wait(ANSWER_S), f"nothing came on {topic}"
+            assert began.wait(RESPONSE_TIMEOUT_S), f"nothing came on {topic}"
             yield messages
         finally:
             subscriber.unsubscribe()

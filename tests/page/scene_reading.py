@@ -1,4 +1,4 @@
-"""What tests read of the picture: its pixels and `window.volery`."""
+"""What tests read of the scene view: its pixels and `window.volery`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ DRAWN_S = 600.0
 """A loaded machine draws WebGL slowly."""
 
 
-def wait_for_picture(page):
-    """Until the world is in the picture."""
+def wait_for_world(page):
+    """Wait until the world is drawn."""
     page.wait_for_function(
-        "() => window.volery !== undefined && window.volery.firstPictureMs > 0",
+        "() => window.volery !== undefined && window.volery.firstRenderMs > 0",
         timeout=1000 * DRAWN_S,
     )
 
@@ -30,7 +30,7 @@ def wait_for_frames(page, count=3):
 
 
 def wait_for_rest(page):
-    """Until the camera stands still, as after the first picture."""
+    """Until the camera stands still, as after the first frame."""
     seen = []
 
     def rests(page):
@@ -45,15 +45,15 @@ def wait_until(page, condition, timeout_s=DRAWN_S):
     """Until a Python condition of the page is true; the last value that it gave."""
     ends = time.monotonic() + timeout_s
     while not (value := condition(page)):
-        assert time.monotonic() < ends, "it has not happened in the picture"
+        assert time.monotonic() < ends, "it has not happened in the scene view"
         page.wait_for_timeout(100)
     return value
 
 
 def pixels(page):
     """(height, width, 3) the scene as it is on the screen, 0 to 1."""
-    picture = page.get_by_label("Scene", exact=True).screenshot()
-    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=float) / 255.0
+    image = page.get_by_label("Scene", exact=True).screenshot()
+    return np.asarray(Image.open(io.BytesIO(image)).convert("RGB"), dtype=float) / 255.0
 
 
 def eye(page):
@@ -67,7 +67,7 @@ def on_screen(page, uav):
 
 
 def project(page, point):
-    """(x, y) where a place (m, map) is in the window, CSS pixels; by the camera's pose alone."""
+    """(x, y) where a position (m, map) is in the window, CSS pixels; by the camera's pose alone."""
     camera = page.evaluate("window.volery.camera")
     box = page.get_by_label("Scene", exact=True).locator("canvas").first.bounding_box()
     x, y, z, w = camera["quaternion"]

@@ -5,10 +5,10 @@ import io
 
 import numpy as np
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from PIL import Image
-from scene_reading import wait_for_picture, wait_until
+from scene_reading import wait_for_world, wait_until
 from truth import until
 from working import WIDE, pull
 
@@ -63,7 +63,7 @@ def served(chromium, tmp_path_factory):
 def opened(module_browsing, served):
     page = module_browsing.open(served.url, viewport=WIDE)
     page.get_by_role("option", name="uav1").wait_for()
-    wait_for_picture(page)
+    wait_for_world(page)
     page.keyboard.press("p")
     page.keyboard.press("m")
     return page
@@ -80,23 +80,23 @@ def tile(page, title):
 
 def titles(page):
     """Colour and depth, as their tiles are called."""
-    groups = page.locator(".tile canvas.picture")
+    groups = page.locator(".tile canvas.camera-image")
     until(lambda: groups.count() == 2, what="there are no two tiles")
     names = [groups.nth(k).get_attribute("aria-label") for k in range(2)]
     return sorted(names, key=lambda name: "depth" in name)
 
 
 def shown(page, title):
-    """(height, width, 3) pixels of a tile's canvas, once a picture has come."""
+    """(height, width, 3) pixels of a tile's canvas, once an image has come."""
     canvas = page.get_by_role("img", name=title, exact=True)
     wait_until(page, lambda _: canvas.evaluate("canvas => canvas.width") == WIDTH)
     data = canvas.evaluate("canvas => canvas.toDataURL('image/png')").partition(",")[2]
-    picture = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
-    return np.asarray(picture, dtype=float)
+    image = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
+    return np.asarray(image, dtype=float)
 
 
 def sent(served, *, depth):
-    """The raw picture of the camera as a client beside the page receives it."""
+    """The raw image of the camera as a client beside the page receives it."""
     topics = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")["topics"]
     ending = "front/depth" if depth else "front/image_raw"
     (name,) = [name for name in topics if name.endswith(ending)]
@@ -112,7 +112,7 @@ def test_colours_are_those_of_the_camera(page, served):
     true = np.frombuffer(sent(served, depth=False), np.uint8).reshape(HEIGHT, WIDTH, 3)
     assert true.std() > 20.0  # there is something to be seen
     assert np.abs(seen - true).mean() < 4.0  # JPEG of the same
-    keep_picture(page, "pictures")
+    save_screenshot(page, "pictures")
 
 
 def test_depth_is_near_red_and_far_blue(page, served):
@@ -121,19 +121,21 @@ def test_depth_is_near_red_and_far_blue(page, served):
     true = np.frombuffer(sent(served, depth=True), np.float32).reshape(HEIGHT, WIDTH)
     known = np.isfinite(true)
     assert 0.2 < known.mean() < 0.9  # the sky has no depth
-    least, most = true[known].min(), true[known].max()
-    span = most - least
-    near, far = known & (true < least + 0.1 * span), known & (true > most - 0.2 * span)
+    min_m, max_m = true[known].min(), true[known].max()
+    span = max_m - min_m
+    near, far = known & (true < min_m + 0.1 * span), known & (true > max_m - 0.2 * span)
     assert (seen[near][:, 0] > seen[near][:, 2] + 50).mean() > 0.95
     assert (seen[far][:, 2] > seen[far][:, 0]).mean() > 0.95
     assert np.ptp(seen[~known], axis=0).max() < 8.0  # what is not known has one colour
-    legend = page.locator(".picture-legend").get_attribute("aria-label")
-    told = [float(part.split()[0]) for part in legend.split(" to ")]
-    assert told[0] == pytest.approx(least, abs=0.3)
-    assert told[1] == pytest.approx(most, rel=0.1)  # of another picture, and noise grows with range
+    legend = page.locator(".camera-legend").get_attribute("aria-label")
+    limits = [float(part.split()[0]) for part in legend.split(" to ")]
+    assert limits[0] == pytest.approx(min_m, abs=0.3)
+    assert limits[1] == pytest.approx(
+        max_m, rel=0.1
+    )  # of another image, and noise grows with range
 
 
-def test_a_tile_tells_the_rate_at_which_pictures_come(page):
+def test_a_tile_shows_the_rate_at_which_images_come(page):
     colour, _ = titles(page)
     label = page.get_by_label(f"{colour}: rate and age")
     until(lambda: label.inner_text()[:1] in set("0123456789"))
@@ -159,7 +161,7 @@ def test_tiles_are_dragged_resized_and_closed(page):
     page.get_by_role("button", name=f"{colour}: smaller").click()
     assert tile(page, colour).bounding_box()["width"] == pytest.approx(larger["width"] - 40, abs=3)
     page.reload()
-    page.locator(".tile canvas.picture").first.wait_for()
+    page.locator(".tile canvas.camera-image").first.wait_for()
     kept = tile(page, colour).bounding_box()
     assert kept["width"] == pytest.approx(larger["width"] - 40, abs=3)
     # What lies below comes to the front where it is touched.

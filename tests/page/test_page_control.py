@@ -2,16 +2,16 @@
 
 import pytest
 import roslibpy
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from scene_reading import wait_until
 from truth import (
     VEHICLES,
+    collect_statuses,
+    collect_vehicles,
     first_after_return,
-    heard_status,
-    heard_vehicles,
     hurried,
     of_uav,
-    place,
+    position_of,
     put,
     set_speed,
     stamp_ns,
@@ -51,26 +51,26 @@ def page(opened, shared):
 
 def test_pause_step_and_play(page, served):
     page.get_by_role("button", name="Pause", exact=True).click()
-    paused = status(served, lambda told: told["state"] == 2)
+    paused = status(served, lambda state: state["state"] == 2)
     page.get_by_role("button", name="Step", exact=True).click()
-    stepped = status(served, lambda told: told["stamp"] != paused["stamp"])
-    ns = [stamp_ns(told) for told in (paused, stepped)]
+    stepped = status(served, lambda state: state["stamp"] != paused["stamp"])
+    ns = [stamp_ns(state) for state in (paused, stepped)]
     assert 0 < ns[1] - ns[0] <= 4_000_000  # one physics step
     page.get_by_role("button", name="Multiple steps").click()
     page.get_by_label("Physics steps").fill("500")
     page.get_by_role("dialog").get_by_role("button", name="Step", exact=True).click()
-    status(served, lambda told: stamp_ns(told) == ns[1] + 500 * (ns[1] - ns[0]))
+    status(served, lambda state: stamp_ns(state) == ns[1] + 500 * (ns[1] - ns[0]))
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Play", exact=True).click()
-    status(served, lambda told: told["state"] == 1)
+    status(served, lambda state: state["state"] == 1)
 
 
 def test_the_speed_slider_goes_from_slow_to_unbounded(page, served):
     page.get_by_role("button", name="Speed").click()
     set_slider(page, "Speed", "Home", 1)
-    status(served, lambda told: told["speed"] == pytest.approx(0.1))
+    status(served, lambda state: state["speed"] == pytest.approx(0.1))
     set_slider(page, "Speed", "End", 1)
-    status(served, lambda told: told["speed"] == 0.0)
+    status(served, lambda state: state["speed"] == 0.0)
     page.keyboard.press("Escape")
     set_speed(served, 1.0)
 
@@ -84,10 +84,10 @@ def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
     assert listed["names"] == ["before"]
     kept_s = listed["stamps"][0]["sec"]
     with hurried(served):
-        status(served, lambda told: told["stamp"]["sec"] >= kept_s + 3)
-    with heard_status(served) as heard:
+        status(served, lambda state: state["stamp"]["sec"] >= kept_s + 3)
+    with collect_statuses(served) as received:
         page.get_by_role("button", name="Restore before").click()
-        restored = until(lambda: first_after_return(heard))
+        restored = until(lambda: first_after_return(received))
     assert kept_s <= restored["stamp"]["sec"] <= kept_s + 2
     page.get_by_role("button", name="Delete before").click()
     page.get_by_text("No snapshots.").wait_for()
@@ -95,18 +95,18 @@ def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
 
 def test_a_reset_goes_back_to_the_start(page, served):
     with hurried(served):
-        status(served, lambda told: told["stamp"]["sec"] >= 3)
+        status(served, lambda state: state["stamp"]["sec"] >= 3)
     page.get_by_role("button", name="Reset", exact=True).click()
-    with heard_status(served) as heard:
+    with collect_statuses(served) as received:
         page.get_by_role("button", name="Reset, same seed").click()
-        started = until(lambda: first_after_return(heard))
+        started = until(lambda: first_after_return(received))
     assert started["stamp"]["sec"] <= 2
 
 
 # ------------------------------------------------------------------------------------------- UAVs
 
 
-def test_orders_and_a_place_to_go_to(page, served):
+def test_commands_and_a_position_to_go_to(page, served):
     panel = inspect(page, "uav1")
     with hurried(served):
         vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
@@ -119,18 +119,18 @@ def test_orders_and_a_place_to_go_to(page, served):
     assert there["position"]["y"] == pytest.approx(-3.0, abs=1.0)
     panel.get_by_role("button", name="Land", exact=True).click()
     vehicle(served, "uav1", lambda uav: uav["mode"] in ("LAND", "LANDED"))
-    keep_picture(page, "inspector")
+    save_screenshot(page, "inspector")
 
 
 def test_return_brings_a_uav_home(page, served):
     with hurried(served):
         vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
-    home = place(served, "uav2")
+    home = position_of(served, "uav2")
     put(served, "uav2", home[0] + 4.0, home[1], home[2])
     panel = inspect(page, "uav2")
-    with heard_vehicles(served) as heard:
+    with collect_vehicles(served) as received:
         panel.get_by_role("button", name="Return", exact=True).click()
-        until(lambda: any(uav["mode"] == "RETURN" for uav in of_uav(heard, "uav2")))
+        until(lambda: any(uav["mode"] == "RETURN" for uav in of_uav(received, "uav2")))
     with hurried(served):
         vehicle(served, "uav2", lambda uav: abs(uav["position"]["x"] - home[0]) < 0.5)
     served.call("/uav2/hold", "std_srvs/srv/Trigger")
@@ -200,8 +200,8 @@ def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page,
     page.get_by_role("group", name="Manual control").wait_for()
     page.evaluate(SLOW_FRAMES)
     page.keyboard.down("KeyS")
-    with heard_vehicles(served) as heard:
-        until(lambda: flies_on(of_uav(heard, "uav2")))
+    with collect_vehicles(served) as received:
+        until(lambda: flies_on(of_uav(received, "uav2")))
     hanging = []
 
     def hang(route):  # a plain function: Playwright sets an attribute of it
@@ -221,7 +221,7 @@ def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page,
 
 def test_a_uav_is_chosen_and_flown_without_a_mouse(page, served):
     vehicle(served, "uav2", lambda uav: uav["mode"] in ("HOLD", "VELOCITY"))
-    before = place(served, "uav2")
+    before = position_of(served, "uav2")
     page.get_by_role("option", name="uav1").click()
     tab_to(page, page.get_by_role("listbox", name="UAVs"))
     page.keyboard.press("ArrowDown")
@@ -272,18 +272,20 @@ def test_control_is_taken_and_let_go(page, served):
 def test_weather_follows_its_sliders(page, served):
     open_panel(page, "Environment")
     set_slider(page, "Rain", "ArrowRight", 8)
-    weather(served, lambda told: told["rain"] == pytest.approx(8.0))
+    weather(served, lambda state: state["rain"] == pytest.approx(8.0))
     set_slider(page, "Fog", "End", 1)
-    weather(served, lambda told: told["fog_visibility"] == pytest.approx(10.0))
+    weather(served, lambda state: state["fog_visibility"] == pytest.approx(10.0))
     page.get_by_label("Fog now").get_by_text("10 m").wait_for()
     set_slider(page, "Snow", "ArrowRight", 2)
     set_slider(page, "Dust", "End", 1)
     set_slider(page, "Turbulence", "ArrowRight", 6)
-    told = weather(served, lambda told: told["w20"] == pytest.approx(3.0))
-    assert told["snow"] > 0.0
-    assert 0.0 < told["dust_visibility"] < 1000.0
+    state = weather(served, lambda state: state["w20"] == pytest.approx(3.0))
+    assert state["snow"] > 0.0
+    assert 0.0 < state["dust_visibility"] < 1000.0
     set_slider(page, "Wind", "ArrowRight", 6)
-    told = weather(served, lambda told: told["wind"]["y"] == pytest.approx(-3.0))  # from the north
-    assert told["rain"] == pytest.approx(8.0)
+    state = weather(
+        served, lambda state: state["wind"]["y"] == pytest.approx(-3.0)
+    )  # from the north
+    assert state["rain"] == pytest.approx(8.0)
     page.get_by_role("button", name="Clear weather").click()
-    weather(served, lambda told: told["rain"] == told["fog_visibility"] == 0.0)
+    weather(served, lambda state: state["rain"] == state["fog_visibility"] == 0.0)

@@ -1,11 +1,11 @@
-"""Panels of data: what they show is what the simulation says, and what they ask for happens."""
+"""Panels of data: they show what the simulation publishes, and their requests take effect."""
 
 import json
 import re
 
 import pytest
-from page_browsing import keep_picture
-from truth import heard_vehicles, of_uav, pass_seconds, place, until
+from page_browsing import save_screenshot
+from truth import collect_vehicles, of_uav, pass_seconds, position_of, until
 from working import WIDE, choose, open_panel
 
 pytestmark = pytest.mark.slow
@@ -49,12 +49,12 @@ def test_a_topic_unfolds_with_its_rate_and_live_values(page, served):
     height = row.locator("[data-path='pose.pose.position.z']")
     height.wait_for()
     until(lambda: number(row.locator("[data-kind=rate]").inner_text() or "0") > 0)
-    told = served.once("/uav1/odom", ODOMETRY)
+    odometry = served.once("/uav1/odom", ODOMETRY)
     assert number(height.inner_text()) == pytest.approx(
-        told["pose"]["pose"]["position"]["z"], abs=0.5
+        odometry["pose"]["pose"]["position"]["z"], abs=0.5
     )
     assert number(row.locator("[data-kind=size]").inner_text()) > 0
-    keep_picture(page, "topics")
+    save_screenshot(page, "topics")
 
 
 def test_a_form_publishes_what_a_subscriber_receives(page, served):
@@ -85,7 +85,7 @@ def test_a_plot_draws_a_field_and_keeps_it_as_csv(page):
     page.get_by_role("option", name="pose.pose.position.z", exact=True).click()
     line = panel.locator("[data-line='/uav1/odom.pose.pose.position.z']")
     until(lambda: re.search(r" \d", line.inner_text()))
-    keep_picture(page, "plots")
+    save_screenshot(page, "plots")
     head, *rows = until(lambda: csv_of(page, panel, 10))
     assert head == "time_s,/uav1/odom.pose.pose.position.z"
     times = [float(row.split(",")[0]) for row in rows]
@@ -93,12 +93,12 @@ def test_a_plot_draws_a_field_and_keeps_it_as_csv(page):
     assert all(-1.0 < float(row.split(",")[1]) < 5.0 for row in rows)
 
 
-def csv_of(page, panel, most):
+def csv_of(page, panel, min_rows):
     """Lines of the plot's file once it has more than so many values, or None."""
     with page.expect_download() as kept:
         panel.get_by_role("button", name="Download as CSV").click()
     lines = kept.value.path().read_text().splitlines()
-    return lines if len(lines) > most + 1 else None
+    return lines if len(lines) > min_rows + 1 else None
 
 
 def test_a_service_is_called_by_a_form_of_its_own(page, served):
@@ -108,30 +108,30 @@ def test_a_service_is_called_by_a_form_of_its_own(page, served):
     form = panel.get_by_role("form", name="Call /uav1/take_off_to")
     form.get_by_label("altitude").fill("3")
     form.get_by_role("button", name="Call", exact=True).click()
-    answer = form.get_by_role("region", name="Response")
-    answer.locator("[data-path=message]").wait_for()
-    keep_picture(page, "services")
-    assert answer.locator("[data-path=success]").inner_text() in ("true", "false")
+    response = form.get_by_role("region", name="Response")
+    response.locator("[data-path=message]").wait_for()
+    save_screenshot(page, "services")
+    assert response.locator("[data-path=success]").inner_text() in ("true", "false")
 
 
-def test_a_fault_is_injected_and_told_in_the_log(page, served):
+def test_a_fault_is_injected_and_shown_in_the_log(page, served):
     panel = open_panel(page, "Faults")
     panel.get_by_label("Fault type").click()
     page.get_by_role("option", name="Displacement").click()
     for axis, metres in (("east", "3"), ("north", "0"), ("up", "1")):
         panel.get_by_label(f"Offset, m, {axis}").fill(metres)
-    x = place(served, "uav1")[0]
-    with heard_vehicles(served) as heard:
+    x = position_of(served, "uav1")[0]
+    with collect_vehicles(served) as received:
         panel.get_by_role("button", name="Inject").click()
-        until(lambda: any(uav["position"]["x"] > x + 2.0 for uav in of_uav(heard, "uav1")))
+        until(lambda: any(uav["position"]["x"] > x + 2.0 for uav in of_uav(received, "uav1")))
     log = open_panel(page, "Log")
     log.get_by_role("log").get_by_text("fault", exact=True).first.wait_for()
-    keep_picture(page, "log")
+    save_screenshot(page, "log")
     log.get_by_label("Filter the log").fill("nothing is called so")
     assert log.get_by_role("log").inner_text() == ""
 
 
-def test_a_wrong_fault_tells_why(page):
+def test_a_wrong_fault_shows_why(page):
     panel = open_panel(page, "Faults")
     panel.get_by_label("Rotor", exact=True).fill("99")
     panel.get_by_role("button", name="Inject").click()
@@ -145,7 +145,7 @@ def test_an_active_fault_is_listed_and_can_be_ended(page):
     panel.get_by_role("button", name="Inject").click()
     badge = page.get_by_role("option", name="uav2").get_by_label("Fault: imu dropped")
     badge.wait_for()
-    keep_picture(page, "active_fault")
+    save_screenshot(page, "active_fault")
     listed = panel.get_by_role("list", name="Active faults").get_by_role("listitem")
     assert re.match(r"uav2 imu dropped . since \d", listed.inner_text())
     listed.get_by_role("button", name="End imu dropped of uav2").click()
@@ -167,7 +167,7 @@ def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, served, rec
         row.get_by_role("link", name=f"Download {name}").click()
     content = kept.value.path().read_bytes()
     assert content == (recordings / name).read_bytes()
-    keep_picture(page, "recordings")
+    save_screenshot(page, "recordings")
     with page.expect_file_chooser() as chosen:
         panel.get_by_role("button", name="Upload a log").click()
     chosen.value.set_files({"name": f"brought_{name}", "mimeType": "", "buffer": content})
@@ -175,13 +175,13 @@ def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, served, rec
     assert (recordings / f"brought_{name}").read_bytes() == content
 
 
-def test_the_meter_tells_age_load_and_memory(page):
+def test_the_meter_shows_age_load_and_memory(page):
     meter = page.get_by_role("button", name=re.compile("^Health"))
     until(lambda: re.search(r"\d+ m?s", meter.get_attribute("aria-label")))
     meter.click()
     details = page.get_by_role("dialog", name="Health")
     details.get_by_text("advance vehicles").wait_for()
-    keep_picture(page, "health")
+    save_screenshot(page, "health")
     assert "MB" in details.inner_text()
 
 
@@ -209,7 +209,7 @@ def test_a_recording_is_played_with_a_slider_and_left_again(page, served, shared
     page.keyboard.press("Home")
     start = float(slider.get_attribute("aria-valuemin"))
     until(lambda: float(slider.get_attribute("aria-valuenow")) < start + 0.2)
-    keep_picture(page, "player")
+    save_screenshot(page, "player")
     player.get_by_role("button", name="Play the recording").click()
     until(lambda: float(slider.get_attribute("aria-valuenow")) > start + 0.2)
     page.get_by_label("Link: playback").wait_for()

@@ -1,9 +1,9 @@
 """The page where a scenario ends: it says so, and what it offers works."""
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
-from truth import first_after_return, heard_status, set_speed, stamp_ns, status, until
+from truth import collect_statuses, first_after_return, set_speed, stamp_ns, status, until
 from working import SMALL
 
 pytestmark = pytest.mark.slow
@@ -31,11 +31,11 @@ def banner(browsing, served):
 def test_a_reset_flies_again_and_fly_on_passes_the_end(banner, served):
     assert served.status()["state"] == "ended"
     assert "0:03.0" in banner.inner_text()
-    keep_picture(banner.page, "end")
+    save_screenshot(banner.page, "end")
     set_speed(served, SLOW)  # so that nothing below comes after the next end
-    with heard_status(served) as heard:
+    with collect_statuses(served) as received:
         banner.get_by_role("button", name="Reset").click()
-        started = until(lambda: first_after_return(heard))
+        started = until(lambda: first_after_return(received))
     assert stamp_ns(started) < END_NS
     assert served.status()["state"] == "flying"
     banner.wait_for(state="detached")
@@ -43,5 +43,5 @@ def test_a_reset_flies_again_and_fly_on_passes_the_end(banner, served):
     banner.wait_for()
     banner.get_by_role("button", name="Continue").click()
     banner.wait_for(state="detached")
-    status(served, lambda told: stamp_ns(told) > END_NS + 1_000_000_000)
+    status(served, lambda message: stamp_ns(message) > END_NS + 1_000_000_000)
     assert served.status()["state"] == "flying"

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 
 from volery.scenario import library
@@ -35,7 +35,7 @@ def test_the_page_begins_with_the_choice_of_scenarios(browsing, served):
     assert not [title for title in dialog.locator(".card-title").all_inner_texts() if "_" in title]
     assert cards.locator("p").evaluate_all(OVERFLOWS) == 0
     assert cards.locator("p").evaluate_all(CLIPPED) == 0
-    keep_picture(page, "first_visit")
+    save_screenshot(page, "first_visit")
     page.keyboard.press("Escape")
     dialog.wait_for(state="detached")
     page.get_by_role("button", name=re.compile("Scenario hover")).get_by_text(
@@ -64,7 +64,7 @@ def test_a_phone_shows_whole_cards_and_an_empty_plot_with_its_hint_alone(browsin
     page.get_by_role("button", name="Plots", exact=True).tap()
     page.get_by_text("Choose a topic and a field below to add a line.").wait_for()
     assert not page.locator("[data-empty] canvas").first.is_visible()
-    keep_picture(page, "phone_empty_plot")
+    save_screenshot(page, "phone_empty_plot")
 
 
 @pytest.mark.parametrize("width", [390, 360])
@@ -90,4 +90,4 @@ def test_a_phone_shows_whole_titles_in_two_rows_of_the_top_bar(browsing, served,
     assert len(heights) > 10
     assert [title for title, is_whole, _ in heights if not is_whole] == []
     assert max(height for *_, height in heights) < 90
-    keep_picture(page, f"phone_title_{width}")
+    save_screenshot(page, f"phone_title_{width}")

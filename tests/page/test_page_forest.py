@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from page_browsing import keep_picture
-from scene_reading import eye, wait_for_frames, wait_for_picture, wait_until
+from page_browsing import save_screenshot
+from scene_reading import eye, wait_for_frames, wait_for_world, wait_until
 
 from volery.runtime.construction.worlds import build_city, build_forest, build_terrain
 from volery.scenario.load import load_scenario
@@ -11,9 +11,9 @@ from volery.scenario.load import load_scenario
 pytestmark = pytest.mark.slow
 
 SCENARIO = "forest_procedural"
-MOST_DRAW_CALLS = 250
+MAX_DRAW_CALLS = 250
 WITH_TREES = 5000
-"""Triangles of a picture, at least, once trees are in it: they come some frames after a jump."""
+"""Triangles of a frame, at least, once trees are in it: they come some frames after a jump."""
 WALKED_ON = 20
 """Frames, each a step of at most 0.1 s: time enough to pass through a trunk."""
 SMALL = {"width": 480, "height": 270}
@@ -35,7 +35,7 @@ def opened(module_browsing, served):
     """One page for all tests, at a quarter of the pixels: what is drawn is the same."""
     look = f"#view=fly&quality=minimal&camera={CAMERAS['minimal'][0]}"
     page = module_browsing.open(served.url + look, viewport=SMALL, device_scale_factor=0.5)
-    wait_for_picture(page)
+    wait_for_world(page)
     return page
 
 
@@ -45,11 +45,11 @@ def page(opened, shared):
 
 
 def look_from(page, served, view, quality, camera):
-    """Take another place and draw from there."""
+    """Move the camera and draw from there."""
     page.goto(f"{served.url}#view={view}&quality={quality}&camera={camera}")
     axes = 2 if view == "walk" else 3  # a walker's eye is at his own height
-    place = [float(number) for number in camera.split("_")[:axes]]
-    wait_until(page, lambda page: np.allclose(eye(page)[:axes], place, atol=0.1))
+    position = [float(number) for number in camera.split("_")[:axes]]
+    wait_until(page, lambda page: np.allclose(eye(page)[:axes], position, atol=0.1))
     wait_until(page, lambda page: page.evaluate("window.volery.quality") == quality)
     wait_for_frames(page, 3)
 
@@ -81,17 +81,17 @@ def test_draw_calls_of_five_thousand_trees(page, served, forest, quality):
         look_from(page, served, "fly", quality, camera)
         wait_until(page, lambda page: page.evaluate("window.volery.triangles") > WITH_TREES)
         wait_for_frames(page, 3)
-        keep_picture(page, f"forest_{quality}_{camera.split('_')[2]}")
-        assert 0 < page.evaluate("window.volery.drawCalls") <= MOST_DRAW_CALLS
+        save_screenshot(page, f"forest_{quality}_{camera.split('_')[2]}")
+        assert 0 < page.evaluate("window.volery.drawCalls") <= MAX_DRAW_CALLS
 
 
 def thick_trunk(forest):
     """Place and radius at breast height of a thick trunk with no other near."""
-    places = np.asarray(forest.position_map)
+    positions = np.asarray(forest.position_map)
     dbh = np.array([forest.models[k].dbh_m for k in forest.model_index])
     radii = 0.5 * dbh * np.asarray(forest.scale)[:, 0]
     for tree in np.argsort(-radii):
-        others = np.hypot(*(places[:, :2] - places[tree, :2]).T)
+        others = np.hypot(*(positions[:, :2] - positions[tree, :2]).T)
         if np.sort(others)[1] > 3.0:
-            return places[tree], float(radii[tree])
+            return positions[tree], float(radii[tree])
     raise AssertionError("no trunk stands alone")

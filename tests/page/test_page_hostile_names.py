@@ -6,7 +6,7 @@ import urllib.request
 
 import pytest
 from hostile_robot import LONG, RUN, TEXTS, hostile_robot
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from working import open_panel, panel_button
 
@@ -71,13 +71,13 @@ def test_names_of_a_robot_are_texts(browsing, served, robot):
         panel.get_by_text(f"javascript:{RUN}").first.wait_for()  # the content of the message
         row.click()
     check(page)
-    keep_picture(page, "hostile_topics")
+    save_screenshot(page, "hostile_topics")
     for name in ("Log", "Services", "Plots"):
         panel = open_panel(page, name)
         if name != "Plots":
             panel.get_by_text(IMAGE).first.wait_for()
         check(page)
-    keep_picture(page, "hostile_log")
+    save_screenshot(page, "hostile_log")
     panel = open_panel(page, "Services")
     panel.get_by_role("button", name=f"/{IMAGE}/service", exact=True).click()
     panel.get_by_text(IMAGE).nth(1).wait_for()
@@ -86,14 +86,14 @@ def test_names_of_a_robot_are_texts(browsing, served, robot):
     page.get_by_role("checkbox", name="Coordinate frames").check()
     page.keyboard.press("Escape")
     check(page)
-    keep_picture(page, "hostile_robot")
+    save_screenshot(page, "hostile_robot")
     panel_button(page, "Topics").click()  # the page still obeys
     open_panel(page, "Topics").get_by_placeholder("Filter by name or type").wait_for()
 
 
 def test_names_of_scenarios_recordings_and_uploads_are_texts(browsing, served):
     browsing.expected.append("Failed to load|415|422")
-    assert json.loads(served.ask("recordings")) == []  # the server offers no such name
+    assert json.loads(served.fetch("recordings")) == []  # the server offers no such name
     page = browsing.open(served.url, viewport=LARGE)
     page.get_by_label("Simulated time").wait_for()
     names = [IMAGE, "\u202epac", "javascript:0", "';window.injected=1;'", LONG]
@@ -104,7 +104,7 @@ def test_names_of_scenarios_recordings_and_uploads_are_texts(browsing, served):
     panel.get_by_role("button", name=f"Play {IMAGE}.mcap").click()
     page.get_by_role("alert").filter(has_text="Playback failed").first.wait_for()
     check(page)
-    keep_picture(page, "hostile_recordings")
+    save_screenshot(page, "hostile_recordings")
     page.get_by_role("button", name="Scenario hostile").click()
     dialog = page.get_by_role("dialog")
     dialog.get_by_text(IMAGE).first.wait_for()
@@ -116,7 +116,7 @@ def test_names_of_scenarios_recordings_and_uploads_are_texts(browsing, served):
     page.get_by_role("button", name="Upload", exact=True).click()
     page.get_by_role("alert").filter(has_text="line 1, column 2").wait_for()
     check(page)
-    keep_picture(page, "hostile_upload")
+    save_screenshot(page, "hostile_upload")
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Pause", exact=True).click()
     page.get_by_role("button", name="Play", exact=True).wait_for()
@@ -144,7 +144,7 @@ def test_names_of_trainings_are_texts(browsing, served, tmp_path):
             inside.evaluate(INJECTED) | {"scripts": 0} == CLEAN
         )  # its page has scripts of its own
         check(page)
-        keep_picture(page, "hostile_trainings")
+        save_screenshot(page, "hostile_trainings")
         page.context.close()
 
 
@@ -158,8 +158,8 @@ def test_links_carry_no_script(browsing, served, key):
 
 
 def test_a_scripts_sources_are_the_servers_own(served):
-    with urllib.request.urlopen(served.url, timeout=60.0) as answer:
-        policy = answer.headers["Content-Security-Policy"]
+    with urllib.request.urlopen(served.url, timeout=60.0) as response:
+        policy = response.headers["Content-Security-Policy"]
     rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
     assert rules["script-src"] == "'self'"
     assert rules["default-src"] == "'self'"

@@ -1,4 +1,4 @@
-"""What programs publish beside the sensors is in the picture: maps, voxels, markers, paths."""
+"""What programs publish beside the sensors is in the scene view: maps, voxels, markers, paths."""
 
 import threading
 from contextlib import ExitStack
@@ -6,8 +6,8 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 import roslibpy
-from page_browsing import keep_picture
-from scene_reading import eye, pixels, project, wait_for_frames, wait_for_picture, wait_until
+from page_browsing import save_screenshot
+from scene_reading import eye, pixels, project, wait_for_frames, wait_for_world, wait_until
 from working import SMALL
 
 pytestmark = pytest.mark.slow
@@ -22,7 +22,7 @@ LEVELS = 16
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
     page = module_browsing.open(served.url + LOOK, viewport=SMALL)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.keyboard.press("m")
     wait_until(page, lambda page: abs(eye(page)[2] - 9.0) < 0.1)
     return page
@@ -33,16 +33,16 @@ def page(opened, shared):
     return opened
 
 
-class Telling:
+class Publishing:
     """A program beside the page that publishes one message again and again."""
 
     def __init__(self, served, topic, msgtype, message):
         self._topic = roslibpy.Topic(served.ros, topic, msgtype, latch=True)
         self._message = roslibpy.Message(message)
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._tell)
+        self._thread = threading.Thread(target=self._publish)
 
-    def _tell(self):
+    def _publish(self):
         while not self._ended.is_set():
             self._topic.publish(self._message)
             self._ended.wait(PERIOD_S)
@@ -56,14 +56,14 @@ class Telling:
         self._topic.unadvertise()
 
 
-def colours_at(page, places):
-    """What is seen at places of the map: a colour (3,) each, 0 to 1."""
+def colours_at(page, positions):
+    """What is seen at positions of the map: a colour (3,) each, 0 to 1."""
     box = page.get_by_label("Scene", exact=True).bounding_box()
-    picture, seen = pixels(page), {}
-    for name, place in places.items():
-        x, y = project(page, place)
+    image, seen = pixels(page), {}
+    for name, position in positions.items():
+        x, y = project(page, position)
         column, row = round(x - box["x"]), round(y - box["y"])
-        seen[name] = picture[row - 2 : row + 3, column - 2 : column + 3].mean(axis=(0, 1))
+        seen[name] = image[row - 2 : row + 3, column - 2 : column + 3].mean(axis=(0, 1))
     return seen
 
 
@@ -97,8 +97,14 @@ def octomap(point, resolution):
         bits = (2 if level == LEVELS - 2 else 3) << (2 * child)
         data += [bits & 0xFF, bits >> 8]
     data = [byte - 256 if byte > 127 else byte for byte in data]
-    told = {"header": MAP, "binary": True, "id": "OcTree", "resolution": resolution, "data": data}
-    return told, middle
+    message = {
+        "header": MAP,
+        "binary": True,
+        "id": "OcTree",
+        "resolution": resolution,
+        "data": data,
+    }
+    return message, middle
 
 
 def path():
@@ -118,20 +124,22 @@ def test_markers_maps_and_voxels_stand_where_they_are(page, served):
         "/octomap": ("octomap_msgs/msg/Octomap", voxels, middle),
         "/plan": ("nav_msgs/msg/Path", path(), (-3.0, 1.5, 0.5)),
     }
-    places = {topic: place for topic, (_, _, place) in layers.items()}
-    before = colours_at(page, places)
+    positions = {topic: position for topic, (_, _, position) in layers.items()}
+    before = colours_at(page, positions)
 
     def changed(page):
-        return [t for t, c in colours_at(page, places).items() if np.abs(c - before[t]).max() > 0.1]
+        return [
+            t for t, c in colours_at(page, positions).items() if np.abs(c - before[t]).max() > 0.1
+        ]
 
     with ExitStack() as published:
         for number, (topic, (msgtype, message, _)) in enumerate(layers.items()):
-            published.enter_context(Telling(served, topic, msgtype, message))
+            published.enter_context(Publishing(served, topic, msgtype, message))
             expected = list(layers)[: number + 1]  # and nothing where the others will be
             wait_until(page, lambda page, expected=expected: changed(page) == expected)
         wait_for_frames(page, 2)
-        seen = colours_at(page, places)
-        keep_picture(page, "layers")
+        seen = colours_at(page, positions)
+        save_screenshot(page, "layers")
     red, green, blue = seen["/marker"]
     assert min(red, blue) > green + 0.2
     assert np.ptp(seen["/map"]) < 0.15  # occupied is black or grey, on green

@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from reverse_proxy import ReverseProxy
 from truth import until
@@ -37,14 +37,14 @@ def wait_for_clock(page, fits, timeout_s=600.0):
         time.sleep(0.1)
 
 
-def test_silence_is_told_at_once_and_ends_by_itself(browsing, served):
+def test_silence_is_shown_at_once_and_ends_by_itself(browsing, served):
     page = browsing.open(served.url)
     wait_for_clock(page, lambda s: s > 0)
     os.kill(served.pid, signal.SIGSTOP)
     try:
         banner = page.get_by_role("alert").filter(has_text="No data from the simulation")
         banner.wait_for()
-        keep_picture(page, "silent")
+        save_screenshot(page, "silent")
         assert "Since" in banner.inner_text()
     finally:
         os.kill(served.pid, signal.SIGCONT)
@@ -68,7 +68,7 @@ def test_the_page_comes_back_with_the_server(browsing, served):
     page.unroute("**/api/status")
     banner = page.get_by_role("alert").filter(has_text="No connection")
     banner.wait_for()
-    keep_picture(page, "link_lost")
+    save_screenshot(page, "link_lost")
     shown = row.locator("[data-path='pose.pose.position.z']").inner_text()
     assert shown  # the last that came stays
     served.start()
@@ -109,24 +109,24 @@ def test_a_topic_of_unknown_type_is_listed_and_harms_nothing(browsing, chromium)
 
     started, ports, stop = threading.Event(), [], threading.Event()
 
-    async def answer(socket):
+    async def respond(socket):
         import json
 
         async for text in socket:
-            order = json.loads(text)
-            if order["op"] == "call_service":
+            operation = json.loads(text)
+            if operation["op"] == "call_service":
                 values = {"topics": ["/gripper"], "types": ["acme_msgs/msg/Gripper"]}
-                ok = order["service"] == "/rosapi/topics"
-                reply = {"op": "service_response", "service": order["service"], "result": ok}
-                reply |= {"id": order.get("id"), "values": values if ok else "there is no such"}
+                ok = operation["service"] == "/rosapi/topics"
+                reply = {"op": "service_response", "service": operation["service"], "result": ok}
+                reply |= {"id": operation.get("id"), "values": values if ok else "there is no such"}
                 await socket.send(json.dumps(reply))
-            elif order["op"] == "subscribe" and order["topic"] == "/gripper":
+            elif operation["op"] == "subscribe" and operation["topic"] == "/gripper":
                 force = {"force": 4.5, "names": ["left", "right"]}
-                told = {"op": "publish", "topic": "/gripper", "msg": force}
-                await socket.send(json.dumps(told))
+                publication = {"op": "publish", "topic": "/gripper", "msg": force}
+                await socket.send(json.dumps(publication))
 
     async def run():
-        async with serve_sockets(answer, "127.0.0.1", 0) as server:
+        async with serve_sockets(respond, "127.0.0.1", 0) as server:
             ports.append(server.sockets[0].getsockname()[1])
             started.set()
             while not stop.is_set():
@@ -144,7 +144,7 @@ def test_a_topic_of_unknown_type_is_listed_and_harms_nothing(browsing, chromium)
             force = row.locator("[data-path=force]")
             force.wait_for()
             assert force.inner_text() == "4.50000"
-            keep_picture(page, "unknown_type")
+            save_screenshot(page, "unknown_type")
     finally:
         stop.set()
         thread.join()
@@ -163,7 +163,7 @@ def test_256_uavs(browsing, tmp_path):
         row = page.get_by_role("listitem", name="/uav256/odom", exact=True)
         row.get_by_role("button", name="/uav256/odom", exact=True).click()
         row.locator("[data-path='pose.pose.position.z']").wait_for()
-        keep_picture(page, "256_uavs")
+        save_screenshot(page, "256_uavs")
         assert page.evaluate("window.volery.uavs().length") == 256
         page.get_by_label("Search UAVs").fill("uav25")
         rows = page.get_by_role("option")

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from truth import until
 from working import WIDE
@@ -54,11 +54,11 @@ def test_a_yaml_and_its_image_become_a_world(browsing, served):
         [file("room.pgm", IMAGE), file("room.yaml", ROOM)]
     )
     page.get_by_text("room.yaml + room.pgm").wait_for()
-    keep_picture(page, "map_pair")
+    save_screenshot(page, "map_pair")
     upload.click()
     page.get_by_role("button", name="Start", exact=True).click(timeout=120_000)
     until(lambda: (t := served.status())["state"] == "flying" and t["scenario"] == "room", 180)
-    data = served.ask("world.glb")
+    data = served.fetch("world.glb")
     extras = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])["asset"]["extras"]
     assert extras["kind"] == "grid_map"
 

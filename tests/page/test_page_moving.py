@@ -5,16 +5,16 @@ import re
 import numpy as np
 import pytest
 from map_reading import map_canvas, red_circle
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from scene_reading import (
     on_screen,
     project,
     wait_for_frames,
-    wait_for_picture,
     wait_for_rest,
+    wait_for_world,
     wait_until,
 )
-from truth import hurried, place, put, until, vehicle
+from truth import hurried, position_of, put, until, vehicle
 from working import WIDE, inspect, pull
 
 pytestmark = pytest.mark.slow
@@ -38,20 +38,20 @@ def served(chromium):
     with Served("hover", "--uavs", "3") as server:
         with hurried(server):
             for uav in HOMES:
-                vehicle(server, uav, lambda told: told["mode"] == "HOLD")  # after its take-off
+                vehicle(server, uav, lambda state: state["mode"] == "HOLD")  # after its take-off
         yield server
 
 
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
     page = module_browsing.open(served.url + LOOK, viewport=WIDE)
-    wait_for_picture(page)
+    wait_for_world(page)
     return page
 
 
 @pytest.fixture
 def homes(served):
-    """All UAVs at their places."""
+    """All UAVs at their home positions."""
     for uav, home in HOMES.items():
         put(served, uav, *home)
         served.call(f"/{uav}/hold", "std_srvs/srv/Trigger")
@@ -69,7 +69,7 @@ def page(opened, shared, served, homes):
 
 def test_flight_by_gamepad(browsing, served, homes):
     page = browsing.open(served.url + LOOK, viewport=WIDE, init_script=PAD)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.get_by_role("option", name="uav1").click()
     page.keyboard.press("c")
     hands = page.get_by_role("group", name="Manual control")
@@ -78,7 +78,7 @@ def test_flight_by_gamepad(browsing, served, homes):
     vehicle(served, "uav1", lambda uav: uav["velocity"]["x"] > 1.5 and uav["mode"] == "VELOCITY")
     page.evaluate("window.pad.axes = [0, -1, 0, 0]")  # the left stick up
     vehicle(served, "uav1", lambda uav: uav["velocity"]["z"] > 0.7)
-    x, _, z = place(served, "uav1")
+    x, _, z = position_of(served, "uav1")
     wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z)
     assert x > HOMES["uav1"][0] + 0.5
     page.evaluate("window.pad.axes = [-1, 0, 0, 0]")  # the left stick to the left
@@ -86,14 +86,14 @@ def test_flight_by_gamepad(browsing, served, homes):
     until(lambda: heading(served, "uav1") > 0.5, what="it did not turn left")
     page.evaluate("window.pad.axes = [0.05, -0.05, 0.05, 0.05]")  # within the dead zone
     vehicle(served, "uav1", lambda uav: np.hypot(*list(uav["velocity"].values())[:2]) < 0.2)
-    keep_picture(page, "gamepad")
+    save_screenshot(page, "gamepad")
 
 
 def heading(served, uav):
     """rad, counter-clockwise from east."""
     request = {"entity": uav}
-    told = served.call("/get_entity_state", "simulation_interfaces/srv/GetEntityState", request)
-    turned = told["state"]["pose"]["orientation"]
+    response = served.call("/get_entity_state", "simulation_interfaces/srv/GetEntityState", request)
+    turned = response["state"]["pose"]["orientation"]
     return 2.0 * np.arctan2(turned["z"], turned["w"])
 
 
@@ -125,7 +125,7 @@ def test_the_map_zooms_follows_and_shows_all(browsing, served, homes):
     wait_until(page, lambda page: np.linalg.norm(red_circle(page) - before["uav3"]) < 3.0)
 
 
-# ---------------------------------------------------------------------------------- places
+# ------------------------------------------------------------------------------- positions
 
 
 def near(seen, wanted, metres):
@@ -134,7 +134,7 @@ def near(seen, wanted, metres):
 
 def arrives(served, uav, x, y):
     with hurried(served):
-        until(lambda: near(place(served, uav), (x, y), 0.4), what=f"{uav} did not come")
+        until(lambda: near(position_of(served, uav), (x, y), 0.4), what=f"{uav} did not come")
 
 
 # -------------------------------------------------------------------------------- handles
@@ -149,40 +149,43 @@ def test_a_uav_is_dragged_level_by_its_ring(page, served):
     map_before = red_circle(page)
     page.keyboard.press("v")
     wait_for_frames(page, 3)
-    at = np.array(place(served, "uav1"))
+    at = np.array(position_of(served, "uav1"))
     grip = np.add(
         at, [-handle_scale(page, at), 0.0, 0.0]
     )  # of the ring, what is nearest to the eye
     pull(page, project(page, grip), project(page, np.add(grip, [2.0, -3.0, 0.0])))
     arrives(served, "uav1", at[0] + 2.0, at[1] - 3.0)
-    assert place(served, "uav1")[2] == pytest.approx(at[2], abs=0.4)
+    assert position_of(served, "uav1")[2] == pytest.approx(at[2], abs=0.4)
     wait_until(
         page, lambda page: near(on_screen(page, "uav1")["position"], np.add(at, [2, -3, 0]), 0.5)
     )
     wait_until(page, lambda page: np.linalg.norm(red_circle(page) - map_before) > 4.0)
-    keep_picture(page, "dragged")
+    save_screenshot(page, "dragged")
 
 
 def test_a_uav_is_lifted_by_its_arrow(page, served):
     page.keyboard.press("v")
     wait_for_frames(page, 3)
-    at = np.array(place(served, "uav1"))
+    at = np.array(position_of(served, "uav1"))
     below = on_screen(page, "uav1")
     grip = np.add(at, [0.0, 0.0, 0.9 * handle_scale(page, at)])
     pull(page, project(page, grip), project(page, np.add(grip, [0.0, 0.0, 2.0])))
     with hurried(served):
-        until(lambda: abs(place(served, "uav1")[2] - at[2] - 2.0) < 0.4, what="it was not lifted")
-    assert near(place(served, "uav1"), at, 0.4)
+        until(
+            lambda: abs(position_of(served, "uav1")[2] - at[2] - 2.0) < 0.4,
+            what="it was not lifted",
+        )
+    assert near(position_of(served, "uav1"), at, 0.4)
     wait_until(page, lambda page: on_screen(page, "uav1")["y"] < below["y"] - 20)
 
 
 def test_without_the_handles_a_drag_only_turns_the_view(page, served):
-    at = np.array(place(served, "uav1"))
+    at = np.array(position_of(served, "uav1"))
     seen = on_screen(page, "uav1")
     start = project(page, np.add(at, [-1.0, 0.0, 0.0]))
     pull(page, start, (start[0] + 120, start[1]))
     wait_until(page, lambda page: abs(on_screen(page, "uav1")["x"] - seen["x"]) > 40)
-    assert near(place(served, "uav1"), at, 0.3)
+    assert near(position_of(served, "uav1"), at, 0.3)
 
 
 # ------------------------------------------------------------------------------------ map
@@ -190,9 +193,9 @@ def test_without_the_handles_a_drag_only_turns_the_view(page, served):
 
 def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
     circles = {uav: circle_of(page, uav) for uav in ("uav2", "uav3", "uav1")}
-    way = np.subtract(HOMES["uav3"], HOMES["uav1"])[:2]
+    offset = np.subtract(HOMES["uav3"], HOMES["uav1"])[:2]
     drawn = circles["uav3"] - circles["uav1"]
-    scale = np.linalg.norm(drawn) / np.linalg.norm(way)  # pixels a metre
+    scale = np.linalg.norm(drawn) / np.linalg.norm(offset)  # pixels a metre
     # East is to the right and north up, for all three.
     for uav, circle in circles.items():
         east, north = np.subtract(HOMES[uav], HOMES["uav1"])[:2]
@@ -203,7 +206,7 @@ def test_the_map_circles_the_selected_uav_and_a_click_sends_it(page, served):
     arrives(served, "uav1", 6.0, -4.0)
     wait_until(page, lambda page: np.linalg.norm(red_circle(page) - [x, y]) < 4.0)
     wait_until(page, lambda page: near(on_screen(page, "uav1")["position"], (6.0, -4.0), 0.5))
-    keep_picture(page, "map_click")
+    save_screenshot(page, "map_click")
     # A click on another UAV selects that one instead.
     x, y = circles["uav2"]
     map_canvas(page).click(position={"x": float(x), "y": float(y)})
@@ -224,7 +227,7 @@ def test_new_uavs_stand_where_one_clicks(page, served):
     page.get_by_role("group", name="Add UAVs").get_by_role("button", name="Click position").click()
     page.mouse.click(*project(page, (2.0, 3.0, 0.0)))
     vehicle(served, "uav4")
-    assert near(place(served, "uav4"), (2.0, 3.0), 1.0)
+    assert near(position_of(served, "uav4"), (2.0, 3.0), 1.0)
     seen = wait_until(
         page,
         lambda page: [u for u in page.evaluate("window.volery.uavs()") if u["name"] == "uav4"],
@@ -251,17 +254,17 @@ def test_the_inspector_shows_attitude_and_height(page, served):
     assert abs(nose) < 12.0
 
 
-# --------------------------------------------------------------------------- the first picture
+# ----------------------------------------------------------------------------- the first frame
 
 
 @pytest.mark.parametrize("viewport", [WIDE, {"width": 390, "height": 700}])
-def test_the_first_picture_frames_all_uavs(browsing, served, homes, viewport):
+def test_the_first_image_frames_all_uavs(browsing, served, homes, viewport):
     page = browsing.open(served.url, viewport=viewport)
     page.keyboard.press("m")
-    wait_for_picture(page)
+    wait_for_world(page)
     wait_for_rest(page)
     box = page.get_by_label("Scene", exact=True).bounding_box()
-    seen = np.array([project(page, place(served, uav)) for uav in HOMES])
+    seen = np.array([project(page, position_of(served, uav)) for uav in HOMES])
     inside = (seen - (box["x"], box["y"])) / (box["width"], box["height"])
     assert ((inside > 0.0) & (inside < 1.0)).all(), inside
     assert np.ptp(seen[:, 0]) > 0.6 * min(box["width"], box["height"])
@@ -272,17 +275,17 @@ def test_the_first_picture_frames_all_uavs(browsing, served, homes, viewport):
 
 def test_smoke_rises_from_a_crash(page, served):
     page.get_by_role("option", name="uav2").click()
-    put(served, "uav3", 3.0, 2.0, 3.0)  # in the free part of the picture
-    at = place(served, "uav3")
+    put(served, "uav3", 3.0, 2.0, 3.0)  # in the free part of the view
+    at = position_of(served, "uav3")
     served.call("/uav3/kill", "std_srvs/srv/Trigger")
     vehicle(served, "uav3", lambda uav: uav["crashed"])
     page.get_by_role("option", name=re.compile("uav3.*crashed", re.DOTALL)).wait_for()
     wait_until(page, lambda page: on_screen(page, "uav3")["position"][2] < at[2] - 1.0)
-    x, y = (int(value) for value in project(page, np.add(place(served, "uav3"), [0, 0, 1.5])))
+    x, y = (int(value) for value in project(page, np.add(position_of(served, "uav3"), [0, 0, 1.5])))
     box = {"x": x - 20, "y": y - 20, "width": 40, "height": 40}
     first = page.screenshot(clip=box)
     wait_until(page, lambda page: page.screenshot(clip=box) != first)
-    keep_picture(page, "crash")
+    save_screenshot(page, "crash")
 
 
 def test_a_crashed_uav_is_repaired(page, served):
@@ -294,7 +297,7 @@ def test_a_crashed_uav_is_repaired(page, served):
     repair.wait_for(state="detached")
 
 
-# --------------------------------------------------------------------------------- orders
+# ------------------------------------------------------------------------------- commands
 
 
 def test_hold_by_key(page, served):
@@ -306,5 +309,6 @@ def test_hold_by_key(page, served):
     held = vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.1)
     assert held["position"]["x"] < 290.0  # not where it was sent to
     wait_until(
-        page, lambda page: near(on_screen(page, "uav1")["position"], place(served, "uav1"), 0.5)
+        page,
+        lambda page: near(on_screen(page, "uav1")["position"], position_of(served, "uav1"), 0.5),
     )

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from truth import hurried, until, vehicle
 from working import WIDE, choose_field, open_panel, panel_button
 
@@ -107,7 +107,7 @@ def test_a_field_is_plotted_over_another_one(page, served):
     assert same.get_attribute("aria-pressed") == "true"
     with hurried(served):
         send_away(served)
-    keep_picture(page, "plots_xy")
+    save_screenshot(page, "plots_xy")
     flown = until(lambda: curve_to(page, plots, SENT_TO["x"] - 1.0))
     assert flown[0] == pytest.approx((0.0, 0.0), abs=0.5)
     saved = json.loads(page.evaluate("localStorage.getItem('volery.plots')"))["plots"]
@@ -121,8 +121,8 @@ def test_a_uav_that_returns_to_its_start_leaves_no_trail(page, served):
         if page.evaluate(length) > 0:
             break
     assert page.evaluate(length) > 0
-    told = served.call("/volery/reset_uav", "volery_interfaces/srv/ByName", {"name": "uav1"})
-    assert told["success"], told
+    response = served.call("/volery/reset_uav", "volery_interfaces/srv/ByName", {"name": "uav1"})
+    assert response["success"], response
     until(lambda: page.evaluate(length) == 0)
 
 
@@ -133,7 +133,7 @@ def test_the_window_of_scenarios_takes_every_file(page):
     chosen.value.set_files({"name": "flight.mcap", "mimeType": "", "buffer": b"\x89MCAP0\r\n"})
     dialog = page.get_by_role("dialog", name="Upload a map, a scenario or a log")
     until(lambda: dialog.get_by_role("radio", name="Log").is_checked())
-    keep_picture(page, "upload")
+    save_screenshot(page, "upload")
 
 
 def test_a_phone_shows_one_bottom_panel(page):
@@ -153,4 +153,4 @@ def test_a_phone_shows_one_bottom_panel(page):
     assert name.bounding_box()["width"] > 250
     toolbar = page.get_by_role("button", name="Layers").bounding_box()
     assert page.get_by_role("group", name="Map", exact=True).bounding_box()["y"] > toolbar["y"] + 20
-    keep_picture(page, "phone_services")
+    save_screenshot(page, "phone_services")

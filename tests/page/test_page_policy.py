@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from truth import until
 from working import WIDE, open_panel
 
@@ -24,4 +24,4 @@ def test_the_panel_shows_what_the_policy_observes_and_does(browsing, served):
     value = panel.get_by_role("region", name="Value")
     until(lambda: re.search(r"return: -?\d+\.\d\d", value.inner_text()))
     until(lambda: " " in (value.locator("polyline").get_attribute("points") or ""))
-    keep_picture(page, "policy")
+    save_screenshot(page, "policy")

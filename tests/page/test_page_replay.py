@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from page_serving import Served
-from scene_reading import on_screen, wait_for_picture, wait_until
+from scene_reading import on_screen, wait_for_world, wait_until
 from truth import vehicle, weather
 from working import WIDE, choose, inspect, open_panel, set_slider
 
@@ -28,13 +28,13 @@ def served(chromium, tmp_path_factory):
 @pytest.fixture
 def page(browsing, served):
     page = browsing.open(served.url + "#uav=uav1", viewport=WIDE)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.get_by_role("option", name="uav1").wait_for()
     return page
 
 
 def fly(page, served):
-    """Orders, a place to go to, weather, a fault, keys: each is seen to have its effect."""
+    """Commands, a position to go to, weather, a fault, keys: each is seen to have its effect."""
     panel = inspect(page, "uav1")
     vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")
     panel.get_by_role("button", name="Land", exact=True).click()
@@ -49,7 +49,7 @@ def fly(page, served):
     wait_until(page, lambda page: abs(on_screen(page, "uav1")["position"][1] + 2.0) < 0.4)
     open_panel(page, "Environment")
     set_slider(page, "Wind", "ArrowRight", 8)
-    weather(served, lambda told: told["wind"]["y"] == pytest.approx(-4.0))
+    weather(served, lambda message: message["wind"]["y"] == pytest.approx(-4.0))
     page.get_by_role("button", name="Add a gust").click()
     fault = open_panel(page, "Faults")
     choose(page, fault.get_by_role("combobox", name="Fault type"), "Rotor")
@@ -108,14 +108,14 @@ def test_replayed_commands_repeat_the_flight_of_the_page(page, served, tmp_path)
     }
     again = tmp_path / "again.mcap"
     words = [sys.executable, "-m", "volery", "run", "hover", "--replay-commands", log]
-    told = subprocess.run(
+    done = subprocess.run(
         [*words, "--record", again],
         check=False,
         capture_output=True,
         text=True,
         timeout=REPEATED_S,
     )
-    assert told.returncode == 0, told.stderr
+    assert done.returncode == 0, done.stderr
     first, second = states(log), states(again)
     topics = {topic for topic, _ in first}
     assert topics == set(STATES)

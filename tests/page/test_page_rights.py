@@ -1,4 +1,4 @@
-"""Who may do what on the page: tokens and roles, and two pilots who share the UAVs."""
+"""Rights on the page: tokens and roles, and two operators that share the UAVs."""
 
 import json
 import urllib.error
@@ -7,10 +7,10 @@ import urllib.request
 import numpy as np
 import pytest
 import roslibpy
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
-from scene_reading import on_screen, wait_for_picture, wait_until
-from truth import hurried, pass_seconds, place, until, vehicle
+from scene_reading import on_screen, wait_for_world, wait_until
+from truth import hurried, pass_seconds, position_of, until, vehicle
 from working import WIDE, inspect, open_panel
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ ASK = """
   socket.onmessage = ({ data }) => resolve(JSON.parse(data));
 })
 """
-"""Sends one order past the page's own controls, with the browser's cookie."""
+"""Sends one operation past the page's own controls, with the browser's cookie."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def served(chromium):
     with Served("hover", "--uavs", "2", "--viewer-token", VIEWERS, token=OPERATORS) as server:
         with hurried(server):
             for uav in ("uav1", "uav2"):
-                vehicle(server, uav, lambda told: told["mode"] == "HOLD")
+                vehicle(server, uav, lambda state: state["mode"] == "HOLD")
         yield server
 
 
@@ -50,7 +50,7 @@ def test_without_a_token_the_page_asks_for_one(browsing, served):
     page = browsing.open(served.url, viewport=WIDE)
     page.get_by_text("This server requires a token").wait_for()
     assert page.get_by_role("option", name="uav1").count() == 0
-    keep_picture(page, "token")
+    save_screenshot(page, "token")
     page.get_by_label("Token").fill("wrong")
     page.get_by_role("button", name="Connect").click()
     page.get_by_text("The server does not accept this token").wait_for()
@@ -59,17 +59,17 @@ def test_without_a_token_the_page_asks_for_one(browsing, served):
     page.get_by_role("option", name="uav1").wait_for()
     assert "token" not in page.url
     with pytest.raises(urllib.error.HTTPError, match=r"HTTP Error 40[13]"):
-        served.ask("world.glb", query="")
+        served.fetch("world.glb", query="")
 
 
 def test_a_viewer_sees_all_and_every_control_is_off(browsing, served):
     page = enter(browsing, served, VIEWERS)
-    wait_for_picture(page)
-    assert json.loads(served.ask("status", f"?token={VIEWERS}"))["role"] == "viewer"
+    wait_for_world(page)
+    assert json.loads(served.fetch("status", f"?token={VIEWERS}"))["role"] == "viewer"
     panel = inspect(page, "uav1")
-    orders = panel.get_by_role("group", name="Commands")
+    buttons = panel.get_by_role("group", name="Commands")
     for name in ("Take off", "Land", "Hold", "Return", "Arm", "Kill"):
-        assert orders.get_by_role("button", name=name, exact=True).is_disabled()
+        assert buttons.get_by_role("button", name=name, exact=True).is_disabled()
     for name in ("Go", "Go to a clicked position", "Take control", "Remove uav1"):
         assert panel.get_by_role("button", name=name, exact=True).is_disabled()
     for name in ("Pause", "Reset", "Manual control"):
@@ -79,7 +79,7 @@ def test_a_viewer_sees_all_and_every_control_is_off(browsing, served):
     assert page.get_by_role("slider").count() == 0  # none has a thumb
     assert open_panel(page, "Faults").get_by_role("button", name="Inject").is_disabled()
     assert page.get_by_role("button", name="Send the selected UAV by click").is_disabled()
-    keep_picture(page, "viewer")
+    save_screenshot(page, "viewer")
     # What moves, moves for him too.
     z = on_screen(page, "uav1")["position"][2]
     request = {"position": {"x": 0.0, "y": 0.0, "z": z + 2.0}, "keep_heading": True}
@@ -99,16 +99,16 @@ def test_a_viewers_keys_command_nothing(browsing, served):
 def test_the_server_refuses_a_viewer_whatever_his_page_does(browsing, served):
     page = enter(browsing, served, VIEWERS)
     order = {"op": "call_service", "service": "/uav2/land", "type": "std_srvs/srv/Trigger"}
-    answer = page.evaluate(ASK, order)
-    assert answer.get("result") is False or answer["op"] == "status"
-    assert "viewer" in json.dumps(answer)
+    response = page.evaluate(ASK, order)
+    assert response.get("result") is False or response["op"] == "status"
+    assert "viewer" in json.dumps(response)
     twist = {"linear": {"x": 3.0, "y": 0.0, "z": 0.0}}
     publish = {"op": "publish", "topic": "/uav2/cmd_vel", "msg": twist}
-    answer = page.evaluate(ASK, publish | {"type": "geometry_msgs/msg/Twist"})
-    assert "viewer" in json.dumps(answer)
-    told = vehicle(served, "uav2")
-    assert told["mode"] == "HOLD"
-    assert told["command_age"] < 0
+    response = page.evaluate(ASK, publish | {"type": "geometry_msgs/msg/Twist"})
+    assert "viewer" in json.dumps(response)
+    state = vehicle(served, "uav2")
+    assert state["mode"] == "HOLD"
+    assert state["command_age"] < 0
     upload = "api/uploads?kind=grid_map&name=a.csv"
     status = "(url) => fetch('./' + url, {method: 'POST', body: '0,1'}).then((r) => r.status)"
     browsing.expected += ["403"]
@@ -136,20 +136,20 @@ def test_two_operators_and_a_hand_over(browsing, served):
     ben.keyboard.up("KeyW")
     assert vehicle(served, "uav1")["mode"] != "VELOCITY"
     ben.keyboard.press("Escape")
-    keep_picture(ben, "held_by_another")
+    save_screenshot(ben, "held_by_another")
     annas.get_by_label("New operator").fill("Ben")
     anna.keyboard.press("Escape")  # the list of names
     annas.get_by_role("button", name="Hand over").click()
     vehicle(served, "uav1", lambda uav: uav["operator"] == "Ben")
     annas.get_by_text("Ben controls this UAV: the server refuses your commands.").wait_for()
     bens.get_by_text("You control this UAV as Ben.").wait_for()
-    x = place(served, "uav1")[0]
+    x = position_of(served, "uav1")[0]
     ben.keyboard.press("c")
     ben.keyboard.down("KeyW")
     vehicle(served, "uav1", lambda uav: uav["mode"] == "VELOCITY" and uav["position"]["x"] > x + 1)
     ben.keyboard.up("KeyW")
     with pytest.raises(roslibpy.core.ServiceException, match="held by Ben"):
         served.call("/uav1/hold", "std_srvs/srv/Trigger")
-    ben.context.close()  # who leaves lets go
+    ben.context.close()  # an operator that leaves releases control
     vehicle(served, "uav1", lambda uav: uav["operator"] == "")
     until(lambda: np.isclose(vehicle(served, "uav1")["velocity"]["x"], 0.0, atol=0.2))

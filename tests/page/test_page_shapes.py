@@ -1,7 +1,7 @@
 """Sizes of window, light and dark, and hands that have no mouse."""
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from scene_reading import wait_until
 from working import tab_to
 
@@ -38,12 +38,12 @@ def test_fits_the_window_light_and_dark(browsing, served, size):
     assert overflow(page) <= 0
     for name in PANELS:
         fits_with(page, name, SIZES[size], f"{size}_light")
-    keep_picture(page, f"{size}_light")
+    save_screenshot(page, f"{size}_light")
     page.emulate_media(color_scheme="dark")
     wait_until(page, lambda page: lightness(page) < 0.2)
     assert overflow(page) <= 0
     fits_with(page, "Topics", SIZES[size], f"{size}_dark")
-    keep_picture(page, f"{size}_dark")
+    save_screenshot(page, f"{size}_dark")
 
 
 def fits_with(page, name, size, kept):
@@ -57,7 +57,7 @@ def fits_with(page, name, size, kept):
     assert box["y"] + box["height"] <= size["height"] + 1
     assert overflow(page) <= 0
     if name in ("Topics", "Plots"):
-        keep_picture(page, f"{kept}_{name.lower()}")
+        save_screenshot(page, f"{kept}_{name.lower()}")
     panel_button(page, name).click()
 
 
@@ -158,7 +158,7 @@ def test_panels_of_a_phone_leave_half_of_the_page_to_the_scene(browsing, served)
     scene = page.get_by_role("main").bounding_box()
     assert scene["y"] + scene["height"] == pytest.approx(half, abs=1)
     assert scene["height"] > 0.35 * size["height"]
-    keep_picture(page, "phone_sheet")
+    save_screenshot(page, "phone_sheet")
     drag(page, handle, size["height"] - 200)
     assert panel.bounding_box()["height"] == pytest.approx(200, abs=12)
     drag(page, handle, size["height"] - 5)

@@ -13,8 +13,10 @@ def test_message_types_are_those_of_the_definitions():
     hint = "python tools/typescript_messages.py > web/src/messages/generated.ts"
     # in a process that knows no types of other tests
     words = [sys.executable, WEB.parent / "tools" / "typescript_messages.py"]
-    told = subprocess.run(words, check=True, capture_output=True, text=True, timeout=900).stdout
-    assert written.strip() == told.strip(), hint
+    generated = subprocess.run(
+        words, check=True, capture_output=True, text=True, timeout=900
+    ).stdout
+    assert written.strip() == generated.strip(), hint
 
 
 def test_lock_file_names_no_registry():

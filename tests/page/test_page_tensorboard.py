@@ -1,7 +1,7 @@
 """TensorBoard inside the page, for the trainings of a folder."""
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from working import open_panel, panel_button
 
@@ -49,7 +49,7 @@ def test_the_panel_shows_curves_to_viewers(browsing, served_with_tensorboard):
     frame.locator("scalar-card line-chart").first.wait_for()
     frame.get_by_text("evaluation/success").first.wait_for()
     page.mouse.move(10, 10)
-    keep_picture(page, "tensorboard")
+    save_screenshot(page, "tensorboard")
 
 
 def test_without_a_tensorboard_there_is_no_panel(browsing, served):

@@ -1,9 +1,9 @@
 """A phone: sticks under two thumbs fly a UAV."""
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from scene_reading import on_screen, wait_until
-from truth import hurried, place, vehicle
+from truth import hurried, position_of, vehicle
 
 pytestmark = pytest.mark.slow
 
@@ -17,19 +17,19 @@ class Thumbs:
 
     def __init__(self, page):
         self._devtools = page.context.new_cdp_session(page)
-        self._places = {}
+        self._positions = {}
 
     def put(self, finger, x, y):
         """Lay a finger down, or move it."""
-        kind = "touchMove" if finger in self._places else "touchStart"
-        self._places[finger] = (x, y)
-        self._tell(kind, self._places)
+        kind = "touchMove" if finger in self._positions else "touchStart"
+        self._positions[finger] = (x, y)
+        self._dispatch(kind, self._positions)
 
     def lift(self, finger):
-        self._tell("touchEnd", {finger: self._places.pop(finger)})
+        self._dispatch("touchEnd", {finger: self._positions.pop(finger)})
 
-    def _tell(self, kind, places):
-        points = [{"x": x, "y": y, "id": id_} for id_, (x, y) in places.items()]
+    def _dispatch(self, kind, positions):
+        points = [{"x": x, "y": y, "id": id_} for id_, (x, y) in positions.items()]
         self._devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
@@ -58,7 +58,7 @@ def test_two_thumbs_fly_a_uav(page, served):
     assert panel["y"] + panel["height"] <= min(ly, ry) - RADIUS_PX  # nothing lies under a thumb
     assert max(ly, ry) + RADIUS_PX <= PHONE["height"]
     assert rx - lx > 2 * RADIUS_PX
-    x, _, z = place(served, "uav1")
+    x, _, z = position_of(served, "uav1")
     thumbs = Thumbs(page)
     thumbs.put(1, rx, ry)
     thumbs.put(1, rx, ry - 0.9 * RADIUS_PX)  # ahead
@@ -69,14 +69,14 @@ def test_two_thumbs_fly_a_uav(page, served):
         served, "uav1", lambda uav: uav["velocity"]["z"] > 0.7 and uav["velocity"]["x"] > 1.0
     )
     assert both["velocity"]["z"] < 2.0  # full speed and no more
-    keep_picture(page, "phone_sticks")
+    save_screenshot(page, "phone_sticks")
     thumbs.lift(1)  # the other thumb stays
     vehicle(
         served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.3 and uav["velocity"]["z"] > 0.7
     )
     thumbs.lift(2)
     vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["z"]) < 0.2)
-    flown = place(served, "uav1")
+    flown = position_of(served, "uav1")
     assert flown[0] > x + 1.0
     assert flown[2] > z + 0.5
     wait_until(page, lambda page: on_screen(page, "uav1")["position"][2] > z + 0.5)

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 import trimesh
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from PIL import Image
-from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from scene_reading import pixels, wait_for_frames, wait_for_world, wait_until
 from truth import put, status, until, vehicle
 from working import SMALL
 
@@ -122,7 +122,7 @@ def served(chromium, tmp_path_factory):
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
     page = module_browsing.open(served.url + LOOK, viewport=SMALL)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.keyboard.press("m")  # the map lies over the sky
     return page
 
@@ -150,22 +150,22 @@ def bring(page, name, kind, content):
 
 def stands_ahead(page):
     """How much what is above the horizon ahead differs from the sky beside it."""
-    picture = pixels(page)
-    height, width, _ = picture.shape
-    band = picture[int(0.44 * height) : int(0.48 * height)].mean(axis=0)
+    image = pixels(page)
+    height, width, _ = image.shape
+    band = image[int(0.44 * height) : int(0.48 * height)].mean(axis=0)
     ahead = band[int(0.48 * width) : int(0.52 * width)].mean(axis=0)
     return float(np.abs(ahead - band[int(0.86 * width) : int(0.92 * width)].mean(axis=0)).max())
 
 
 def world(served):
-    """The glTF of what stands in the simulation: its JSON, and places of what is instanced."""
-    data = served.ask("world.glb")
+    """The glTF of what stands in the simulation: its JSON, and poses of what is instanced."""
+    data = served.fetch("world.glb")
     length = int.from_bytes(data[12:16], "little")
     return json.loads(data[20 : 20 + length])
 
 
 def test_at_first_the_horizon_is_clear(page, served):
-    put(served, "uav1", 0.0, 60.0, 2.5)  # out of the picture
+    put(served, "uav1", 0.0, 60.0, 2.5)  # out of the view
     served.call("/uav1/hold", "std_srvs/srv/Trigger")
     wait_for_frames(page, 3)
     wait_until(page, lambda page: stands_ahead(page) < 0.06)
@@ -188,25 +188,25 @@ def test_a_file_becomes_a_world_that_is_flown_in(page, served, name):
     page.get_by_role("button", name=re.compile(rf"Scenario {stem}.*: choose")).wait_for()
     wait_until(page, lambda page: stands_ahead(page) > 0.1)
     assert page.evaluate("window.samePage") is True
-    keep_picture(page, f"uploaded_{stem}_{expected}")
+    save_screenshot(page, f"uploaded_{stem}_{expected}")
 
 
 def flies(served, stem):
-    told = served.status()
-    return told["state"] == "flying" and told["scenario"].startswith(stem)
+    status = served.status()
+    return status["state"] == "flying" and status["scenario"].startswith(stem)
 
 
 def test_wrong_files_are_refused_with_the_reason_and_nothing_is_lost(page, served):
-    known = json.loads(served.ask("scenarios"))
+    known = json.loads(served.fetch("scenarios"))
     flown = served.status()
     before = status(served)["stamp"]["sec"]
     for name, (kind, content, why) in WRONG.items():
         bring(page, name, kind, content)
         refused = page.get_by_role("alert").filter(has_text="Cannot make a scenario")
         refused.filter(has_text=re.compile(re.escape(why))).wait_for()
-    keep_picture(page, "wrong_upload")
-    assert json.loads(served.ask("scenarios")) == known
+    save_screenshot(page, "wrong_upload")
+    assert json.loads(served.fetch("scenarios")) == known
     assert served.status() == flown
-    status(served, lambda told: told["stamp"]["sec"] > before)  # it has flown on
+    status(served, lambda message: message["stamp"]["sec"] > before)  # it has flown on
     page.keyboard.press("Escape")
     page.get_by_role("dialog").wait_for(state="detached")

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
 from truth import until
 from working import SMALL, open_panel
@@ -76,7 +76,7 @@ def test_a_flight_is_judged_as_it_goes_and_a_log_as_a_whole(browsing, served):
     assert outcome(climb) == "not yet"  # the flight may still climb
     assert re.search(r"-0\.\d+ m/s", speed.inner_text())
     page.get_by_text("Verdicts on the flight so far").wait_for()
-    keep_picture(page, "verdicts")
+    save_screenshot(page, "verdicts")
     page.keyboard.press("Escape")
 
     panel = open_panel(page, "Recordings")
@@ -86,7 +86,7 @@ def test_a_flight_is_judged_as_it_goes_and_a_log_as_a_whole(browsing, served):
     contact, speed, climb = opened(page, "1 of 3 met")
     page.get_by_text("Verdicts on the whole flight").wait_for()
     assert [outcome(row) for row in (contact, speed, climb)] == ["met", "failed", "failed"]
-    keep_picture(page, "verdicts_playback")
+    save_screenshot(page, "verdicts_playback")
     moment = speed.get_by_role("button", name=re.compile("Go to 0:0"))
     time_s = float(moment.inner_text().partition(":")[2])
     slider = player.get_by_role("slider")

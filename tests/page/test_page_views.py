@@ -1,11 +1,11 @@
-"""Views and layers: what keys, menu and mouse do to the picture."""
+"""Views and layers: what keys, menu and mouse do to the scene view."""
 
 import numpy as np
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
-from scene_reading import eye, pixels, wait_for_frames, wait_for_picture, wait_until
-from truth import hurried, place, vehicle
+from scene_reading import eye, pixels, wait_for_frames, wait_for_world, wait_until
+from truth import hurried, position_of, vehicle
 from working import SMALL, press_canvas, pull
 
 pytestmark = pytest.mark.slow
@@ -54,14 +54,14 @@ def served(chromium, tmp_path_factory):
     (folder / "scanned.toml").write_text(SCANNED)
     with Served(str(folder / "scanned.toml")) as server:
         with hurried(server):
-            vehicle(server, "uav1", lambda told: told["mode"] == "HOLD")
+            vehicle(server, "uav1", lambda state: state["mode"] == "HOLD")
         yield server
 
 
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
     page = module_browsing.open(served.url + "#quality=minimal&uav=uav1", viewport=SMALL)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.keyboard.press("m")
     return page
 
@@ -74,13 +74,13 @@ def page(opened, shared):
 
 
 def uav_distance(page, served):
-    return float(np.linalg.norm(eye(page) - place(served, "uav1")))
+    return float(np.linalg.norm(eye(page) - position_of(served, "uav1")))
 
 
 def test_a_walker_is_stopped_by_a_block(browsing, served):
     look = "#view=walk&camera=0_2_0_1.5708_0_0"
     page = browsing.open(served.url + look, viewport=SMALL)  # south of the block at x -1..1, y 5..7
-    wait_for_picture(page)
+    wait_for_world(page)
     wait_until(page, lambda page: abs(eye(page)[1] - 2.0) < 0.1)
     press_canvas(page)
     page.keyboard.down("KeyW")
@@ -92,11 +92,11 @@ def test_a_walker_is_stopped_by_a_block(browsing, served):
 
 def test_a_link_keeps_scenario_view_camera_and_selection(browsing, served):
     first = browsing.open(served.url + "#view=fly&camera=-9_4_6_-0.5_-0.3_0")
-    wait_for_picture(first)
+    wait_for_world(first)
     link, stood = first.url, eye(first)
     first.close()  # software draws one page at a time in good time
     second = browsing.open(link.replace("view=fly", "view=fly&uav=uav1"))
-    wait_for_picture(second)
+    wait_for_world(second)
     second.get_by_role("button", name="Fly through", pressed=True).wait_for()
     assert "uav=uav1" in second.url
     np.testing.assert_allclose(eye(second), stood, atol=0.02)
@@ -113,7 +113,7 @@ def test_every_number_key_has_its_view(page, served):
     wait_until(page, lambda page: 0.5 < uav_distance(page, served) < 12.0 and behind(page, served))
     page.keyboard.press("5")
     wait_until(page, lambda page: uav_distance(page, served) < 0.6)
-    keep_picture(page, "onboard")
+    save_screenshot(page, "onboard")
     page.keyboard.press("2")
     wait_until(page, lambda page: abs(eye(page)[2] - 1.7) < 0.05)
     page.keyboard.press("3")
@@ -135,7 +135,7 @@ def heading(page):
 
 def behind(page, served):
     """Whether the eye is west of a UAV that looks east, and looks at it."""
-    return eye(page)[0] < place(served, "uav1")[0] - 0.5 and heading(page)[0] > 0.5
+    return eye(page)[0] < position_of(served, "uav1")[0] - 0.5 and heading(page)[0] > 0.5
 
 
 def test_a_change_of_view_is_no_leap(page):
@@ -155,7 +155,7 @@ def test_a_change_of_view_is_no_leap(page):
     wait_until(page, lambda page: abs(eye(page)[2] - 1.7) < 0.05)
     heights = np.array(page.evaluate("window.eyes"))[:, 2]
     between = (heights > heights[-1] + 0.1) & (heights < heights[0] - 0.1)
-    assert between.any()  # it came by places in between
+    assert between.any()  # it passed positions in between
 
 
 def test_orbit_turns_and_comes_nearer(page, served):
@@ -171,10 +171,10 @@ def test_orbit_turns_and_comes_nearer(page, served):
     wait_until(page, lambda page: uav_distance(page, served) < 0.9 * far)
 
 
-def share_of(page, red):
-    """Share of the picture that is as red, or as blue, as returns are."""
-    picture = pixels(page)
-    r, g, b = np.moveaxis(picture, 2, 0)
+def fraction_of(page, red):
+    """Fraction of the image that is as red, or as blue, as returns are."""
+    image = pixels(page)
+    r, g, b = np.moveaxis(image, 2, 0)
     mask = (r > 0.6) & (g < 0.45) & (b < 0.45) if red else (b > 0.6) & (r < 0.35) & (g < 0.62)
     return float(mask.mean())
 
@@ -183,11 +183,15 @@ def test_returns_of_scanners_are_blue_and_red(page, served):
     page.goto(served.url + "#view=fly&quality=minimal&uav=uav1&camera=-6_0_9_0_-0.85_0")
     wait_until(page, lambda page: abs(eye(page)[2] - 9.0) < 0.2)
     show_returns(page, False)
-    bare = {red: share_of(page, red) for red in (True, False)}  # the airframe has both of its own
+    bare = {
+        red: fraction_of(page, red) for red in (True, False)
+    }  # the airframe has both of its own
     show_returns(page, True)
-    for red, share in bare.items():
-        wait_until(page, lambda page, red=red, share=share: share_of(page, red) > share + 2e-4)
-    keep_picture(page, "returns")
+    for red, fraction in bare.items():
+        wait_until(
+            page, lambda page, red=red, fraction=fraction: fraction_of(page, red) > fraction + 2e-4
+        )
+    save_screenshot(page, "returns")
 
 
 def show_returns(page, shown):

@@ -1,13 +1,13 @@
-"""Worlds are chosen and changed on the page, and stand in the simulation and in the picture."""
+"""Worlds are chosen and changed on the page, and stand in the simulation and in the scene view."""
 
 import json
 import re
 import urllib.error
 
 import pytest
-from page_browsing import keep_picture
+from page_browsing import save_screenshot
 from page_serving import Served
-from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
+from scene_reading import pixels, wait_for_frames, wait_for_world, wait_until
 from truth import until, vehicle
 from working import SMALL, choose, open_panel, set_slider
 
@@ -60,7 +60,7 @@ def served(chromium, tmp_path_factory):
 @pytest.fixture(scope="module")
 def opened(module_browsing, served):
     page = module_browsing.open(served.url + LOOK, viewport=SMALL)
-    wait_for_picture(page)
+    wait_for_world(page)
     page.keyboard.press("m")
     return page
 
@@ -86,35 +86,35 @@ def start(page, served, name, work=lambda dialog: None):
     dialog.wait_for(state="detached", timeout=120_000)
     until(
         lambda: (
-            (told := served.status())["state"] == "flying"
-            and told["scenario"] == name
-            and told["world"] != before
+            (status := served.status())["state"] == "flying"
+            and status["scenario"] == name
+            and status["world"] != before
         ),
         120,
     )
 
 
 def world(served):
-    data = served.ask("world.glb")
+    data = served.fetch("world.glb")
     return json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
 
 
 def standing(page):
-    """Share of the picture above the horizon that is not sky: sky is blue or grey.
+    """Fraction of the image above the horizon that is not sky: sky is blue or grey.
 
     Waits until nothing lies over the scene, such as that a world is being built.
     """
     page.locator(".situation").wait_for(state="hidden", timeout=120_000)
     page.get_by_role("dialog").wait_for(state="hidden", timeout=120_000)
-    picture = pixels(page)
-    height, width, _ = picture.shape
-    part = picture[int(0.12 * height) : int(0.47 * height), int(0.15 * width) : int(0.95 * width)]
+    image = pixels(page)
+    height, width, _ = image.shape
+    part = image[int(0.12 * height) : int(0.47 * height), int(0.15 * width) : int(0.95 * width)]
     return float((part[..., 2] < part[..., 0] + 0.02).mean())
 
 
 def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
     def set_up(dialog):
-        keep_picture(page, "set_up")
+        save_screenshot(page, "set_up")
         dialog.get_by_role("textbox", name="UAVs", exact=True).fill("3")
         choose(page, dialog.get_by_role("combobox", name="Airframe"), "crazyflie")
         dialog.get_by_role("checkbox", name="camera").check()
@@ -123,20 +123,22 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
 
     page.get_by_role("button", name=re.compile("choose another scenario")).click()
     card = page.get_by_role("button", name=re.compile("^hover: "))
-    for told in ("1 UAV: f450", "sonar, IMU", "open ground"):
-        card.get_by_text(told).wait_for()
-    picture = card.locator("img")
-    until(lambda: picture.evaluate("image => image.naturalWidth") > 100)  # a real picture
-    keep_picture(page, "cards")
+    for text in ("1 UAV: f450", "sonar, IMU", "open ground"):
+        card.get_by_text(text).wait_for()
+    image = card.locator("img")
+    until(lambda: image.evaluate("image => image.naturalWidth") > 100)  # a real image
+    save_screenshot(page, "cards")
     page.keyboard.press("Escape")
     page.get_by_role("dialog").wait_for(state="detached")
     page.evaluate("window.samePage = true")
-    start_anew(page, served, set_up)
+    restart(page, served, set_up)
     page.get_by_label("Number of UAVs").get_by_text("3 UAVs").wait_for()
     last = vehicle(served, "uav3")
     assert last["airframe"] == "crazyflie"
-    told = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")
-    own = {n: t for n, t in zip(told["topics"], told["types"], strict=True) if "/uav3/" in n}
+    response = served.call("/rosapi/topics", "rosapi_msgs/srv/Topics")
+    own = {
+        n: t for n, t in zip(response["topics"], response["types"], strict=True) if "/uav3/" in n
+    }
     assert "sensor_msgs/msg/Image" in own.values()
     assert {"sensor_msgs/msg/LaserScan", "sensor_msgs/msg/PointCloud2"} & set(own.values())
     assert "sensor_msgs/msg/Range" not in own.values()
@@ -144,7 +146,7 @@ def test_a_card_is_chosen_with_uavs_airframe_and_sensors(page, served):
     assert page.evaluate("window.samePage") is True
 
 
-def start_anew(page, served, work):
+def restart(page, served, work):
     """The same world once more: its id may stay."""
     vehicle(served, "uav1")
     page.get_by_role("button", name=re.compile("choose another scenario")).click()
@@ -169,7 +171,7 @@ def test_more_trees_a_hectare_are_built_and_seen(page, served):
     until(lambda: served.status()["state"] == "flying" and trees(served) > 60, 120)
     assert trees(served) == pytest.approx(80, abs=1)  # 0.16 ha
     wait_until(page, lambda page: standing(page) > 1.3 * few)
-    keep_picture(page, "denser")
+    save_screenshot(page, "denser")
 
 
 def trees(served):
@@ -197,7 +199,7 @@ def test_blocks_grow_by_their_sliders(page, served):
     set_slider(page, "Cell size", "ArrowRight", 8)
     until(lambda: blocks(served)["cell_size"] == pytest.approx(4.0))
     wait_until(page, lambda page: standing(page) > 1.3 * high)
-    keep_picture(page, "blocks")
+    save_screenshot(page, "blocks")
 
 
 def blocks(served):

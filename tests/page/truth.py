@@ -11,7 +11,7 @@ STATUS = "volery_interfaces/msg/SimulationStatus"
 
 
 def until(fits, timeout_s=600.0, what="it did not become true"):
-    """The first answer of `fits()` that is true."""
+    """The first result of `fits()` that is true."""
     ends = time.monotonic() + timeout_s
     while not (found := fits()):
         assert time.monotonic() < ends, what
@@ -31,7 +31,7 @@ def vehicle(served, uav, fits=lambda _: True, timeout_s=600.0):
     return found[uav]
 
 
-def place(served, uav):
+def position_of(served, uav):
     """(x, y, z) m, map: where it is."""
     at = vehicle(served, uav)["position"]
     return at["x"], at["y"], at["z"]
@@ -42,14 +42,14 @@ def status(served, fits=lambda _: True, timeout_s=600.0):
     return served.once("/volery/status", STATUS, fits, timeout_s)
 
 
-def heard_status(served):
+def collect_statuses(served):
     """Context with the list of what the simulation says of itself, from before its block on."""
-    return served.heard("/volery/status", STATUS)
+    return served.collect("/volery/status", STATUS)
 
 
-def heard_vehicles(served):
+def collect_vehicles(served):
     """Context with the list of the states of all UAVs, from before its block on."""
-    return served.heard("/volery/vehicles", VEHICLES)
+    return served.collect("/volery/vehicles", VEHICLES)
 
 
 def first_after_return(statuses):
@@ -61,14 +61,14 @@ def first_after_return(statuses):
 
 
 def of_uav(messages, uav):
-    """What messages tell of one UAV."""
+    """The states of one UAV in messages."""
     return [one for message in list(messages) for one in message["vehicles"] if one["name"] == uav]
 
 
 def pass_seconds(served, seconds):
     """Wait until so much simulated time has passed."""
     ends_ns = stamp_ns(status(served)) + int(seconds * 1e9)
-    status(served, lambda told: stamp_ns(told) >= ends_ns)
+    status(served, lambda message: stamp_ns(message) >= ends_ns)
 
 
 def set_speed(served, factor):
@@ -80,7 +80,7 @@ def set_speed(served, factor):
 def hurried(served):
     """Simulated time passes as fast as it can, then in real time again.
 
-    For ways and take-offs on which nobody steers by hand.
+    For flights and take-offs without manual control.
     """
     set_speed(served, 0.0)
     try:
@@ -92,10 +92,12 @@ def hurried(served):
 def weather(served, fits=lambda _: True, timeout_s=600.0):
     """The weather, once it is so."""
     ends = time.monotonic() + timeout_s
-    while not fits(told := served.call("/volery/get_weather", "volery_interfaces/srv/GetWeather")):
-        assert time.monotonic() < ends, f"the weather stayed {told}"
+    while not fits(
+        response := served.call("/volery/get_weather", "volery_interfaces/srv/GetWeather")
+    ):
+        assert time.monotonic() < ends, f"the weather stayed {response}"
         time.sleep(0.2)
-    return told
+    return response
 
 
 def put(served, uav, x, y, z):
@@ -107,10 +109,10 @@ def put(served, uav, x, y, z):
         "set_pose": True,
         "set_twist": True,
     }
-    told = served.call("/set_entity_state", "simulation_interfaces/srv/SetEntityState", request)
-    assert told["result"]["result"] == 1, told
+    response = served.call("/set_entity_state", "simulation_interfaces/srv/SetEntityState", request)
+    assert response["result"]["result"] == 1, response
 
 
-def stamp_ns(told):
+def stamp_ns(message):
     """Simulated time of a status."""
-    return told["stamp"]["sec"] * 10**9 + told["stamp"]["nanosec"]
+    return message["stamp"]["sec"] * 10**9 + message["stamp"]["nanosec"]

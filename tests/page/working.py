@@ -56,9 +56,9 @@ def pull(page, start, end, steps=8):
     page.mouse.up()
 
 
-def tab_to(page, element, most=60):
+def tab_to(page, element, max_tabs=60):
     """Give the keyboard to an element as a hand without a mouse does."""
-    for _ in range(most):
+    for _ in range(max_tabs):
         if element.evaluate("element => element === document.activeElement"):
             return
         page.keyboard.press("Tab")
@@ -66,5 +66,5 @@ def tab_to(page, element, most=60):
 
 
 def press_canvas(page):
-    """Give the keyboard to the scene, so that views hear the keys."""
+    """Give the keyboard to the scene, so that views receive the keys."""
     page.get_by_label("Scene", exact=True).locator("canvas").focus()

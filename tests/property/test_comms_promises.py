@@ -31,7 +31,7 @@ happenings = st.one_of(
 
 
 class History:
-    """What was sent, by source and receiver, and what happened to whom."""
+    """What was sent, by source and receiver, and what happened to which station."""
 
     def __init__(self) -> None:
         self.bench = Bench()
@@ -39,20 +39,20 @@ class History:
         for address in STATIONS:
             self.bench.station(address)
 
-    def happen(self, what, who, more) -> None:
+    def happen(self, what, subject, more) -> None:
         bench = self.bench
         if what == "send":
-            self.send(who, more)
-        elif what == "cut" and who in bench.connections:
-            bench.cut(who)
-        elif what == "connect" and who not in bench.connections:
-            bench.connect(who)
+            self.send(subject, more)
+        elif what == "cut" and subject in bench.connections:
+            bench.cut(subject)
+        elif what == "connect" and subject not in bench.connections:
+            bench.connect(subject)
         elif what == "restart":
             bench.restart()
         elif what == "run":
-            bench.run(50 * MS, acknowledge=who)
-        elif what == "half" and who in bench.connections:
-            self.send_partly(who, more)
+            bench.run(50 * MS, acknowledge=subject)
+        elif what == "half" and subject in bench.connections:
+            self.send_partly(subject, more)
 
     def send(self, source: int, to: int) -> None:
         receivers = [each for each in RECEIVERS[to] if each != source or to == source]

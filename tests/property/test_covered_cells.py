@@ -82,7 +82,7 @@ def test_loads_are_as_even_as_can_be(carried, more):
     assert given_.sum() == cells
     assert given_.min() >= 1
     load = carried + given_
-    # who has more than one cell of the part could not give one to another for an evener load
+    # a UAV that has more than one cell of the part could not give one to another for an evener load
     givers = load[given_ > 1]
     assert givers.size == 0 or givers.max() - load.min() <= 1
 

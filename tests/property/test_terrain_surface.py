@@ -12,11 +12,11 @@ heights = arrays(
     array_shapes(min_dims=2, max_dims=2, min_side=2, max_side=6),
     elements=st.floats(-50.0, 50.0),
 )
-share = st.floats(0.001, 0.999)
+fraction = st.floats(0.001, 0.999)
 
 
 @settings(max_examples=200)
-@given(heights, st.floats(0.5, 20.0), share, share)
+@given(heights, st.floats(0.5, 20.0), fraction, fraction)
 def test_height_is_continuous_and_inside_the_cell(grid, spacing, u, v):
     terrain = Terrain.from_heights(grid, spacing, (-3.0, 7.0))
     x0, y0, x1, y1 = terrain.bounds
@@ -28,7 +28,7 @@ def test_height_is_continuous_and_inside_the_cell(grid, spacing, u, v):
 
 
 @settings(max_examples=200)
-@given(heights, st.floats(0.5, 20.0), share, share)
+@given(heights, st.floats(0.5, 20.0), fraction, fraction)
 def test_normal_is_unit_upward_and_square_to_the_surface(grid, spacing, u, v):
     terrain = Terrain.from_heights(grid, spacing)
     x0, y0, x1, y1 = terrain.bounds

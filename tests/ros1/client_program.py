@@ -19,14 +19,14 @@ def say(value):
 
 
 def call(link, service, request=None):
-    told, results = threading.Event(), []
+    is_done, results = threading.Event(), []
 
     def keep(value):
         results.append(value)
-        told.set()
+        is_done.set()
 
     link.call(service, request, ServiceReply(keep, keep))
-    assert told.wait(60.0)
+    assert is_done.wait(60.0)
     return results[0]
 
 

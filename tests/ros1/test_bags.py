@@ -52,7 +52,7 @@ def read(path):
 
 
 def with_valid_times(value):
-    """ROS 1 reads other times, too, but writes them anew."""
+    """ROS 1 reads other times, too, but rewrites them."""
     if isinstance(value, list):
         return [with_valid_times(item) for item in value]
     if isinstance(value, Time | Duration):
@@ -105,5 +105,5 @@ def test_rosbag_plays_a_bag(tmp_path):
         # It drops what does not fit into its queue, and at its end what has not been sent.
         options = ("--wait-for-subscribers", "--queue=1000", "--keep-alive")
         with running("rosbag", "play", *options, str(tmp_path / "run.bag")):
-            heard = [listener.next()[0] for _ in range(200)]
-    assert heard == [f"{k} {TEXT}"[:100] for k in range(200)]
+            received = [listener.next()[0] for _ in range(200)]
+    assert received == [f"{k} {TEXT}"[:100] for k in range(200)]

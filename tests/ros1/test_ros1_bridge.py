@@ -104,7 +104,7 @@ def registered(bridge, live):
 
 
 def wanted(live, topic):
-    """Whether somebody subscribes to a topic of the graph."""
+    """Whether a topic of the graph has subscribers."""
     return any(t.name == topic and t.subscribers for t in live.graph.topics())
 
 
@@ -134,7 +134,7 @@ def test_topics_are_listed_with_their_types(live, registered):
     assert "/use_sim_time" in tool("rosparam", "list")
 
 
-def test_nothing_is_taken_from_the_graph_while_nobody_listens(live, registered):
+def test_nothing_is_taken_from_the_graph_without_subscribers(live, registered):
     publish = live.publisher("/idle", STRING)
     registered("/idle")
     assert not wanted(live, "/idle")
@@ -166,9 +166,9 @@ def test_rates_are_measured(live, registered):
     talking = threading.Thread(target=talk)
     talking.start()
     try:
-        with running("rostopic", "hz", "--wall-time", "-w20", "/rated") as said:
-            assert wait_until(lambda: "average rate" in "".join(said))
-            measured = re.findall(r"average rate: ([\d.]+)", "".join(said))
+        with running("rostopic", "hz", "--wall-time", "-w20", "/rated") as lines:
+            assert wait_until(lambda: "average rate" in "".join(lines))
+            measured = re.findall(r"average rate: ([\d.]+)", "".join(lines))
     finally:
         stop.set()
         talking.join()
@@ -224,7 +224,7 @@ def test_the_late_get_what_was_latched_each_publisher_s_own(live, registered):
         assert early.next()[0] == "new"  # and nothing twice
 
 
-def test_a_slow_reader_delays_nobody(live, bridge, registered):
+def test_a_slow_reader_delays_no_other(live, bridge, registered):
     publish = live.publisher("/flood", STRING)
     registered("/flood")
     with peer("hang", "/flood") as slow, peer("listen", "/flood", "--count=1000000") as quick:
@@ -243,7 +243,7 @@ def test_a_slow_reader_delays_nobody(live, bridge, registered):
 
 
 def subscribed():
-    """Topics with subscribers in ROS 1, and who they are."""
+    """Topics with subscribers in ROS 1, and the names of those."""
     return join_ros1("volery").master.ask("getSystemState")[1]
 
 
@@ -253,19 +253,19 @@ def test_commands_come_in_and_do_not_come_back(live, registered):
     registered("/uav1/cmd_vel")
     assert wait_until(lambda: "/uav1/cmd_vel" in dict(subscribed()))
     twist = "{linear: {x: 1.5}, angular: {z: -0.5}}"
-    kind, heard = "geometry_msgs/Twist", []
+    kind, received = "geometry_msgs/Twist", []
     with peer("listen", "/uav1/cmd_vel", "--twist", "--count=1000000") as listener:
         assert listener.next() == "ready"
         assert wait_until(lambda: readers("/uav1/cmd_vel"))
         with running("rostopic", "pub", "-r5", "/uav1/cmd_vel", kind, twist):
             assert wait_until(lambda: len(seen) >= 3)
-            while sum(sender.startswith("/rostopic") for _, _, sender in heard) < 3:
-                heard.append(listener.next())
+            while sum(sender.startswith("/rostopic") for _, _, sender in received) < 3:
+                received.append(listener.next())
         ours(Twist(Vector3(9.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
-        while heard[-1][0] != 9.0:
-            heard.append(listener.next())
+        while received[-1][0] != 9.0:
+            received.append(listener.next())
     assert seen[0] == Twist(Vector3(1.5, 0.0, 0.0), Vector3(0.0, 0.0, -0.5))
-    assert [x for x, _, sender in heard if sender == "/volery"] == [9.0]  # and none twice
+    assert [x for x, _, sender in received if sender == "/volery"] == [9.0]  # and none twice
 
 
 def test_topics_without_publishers_come_in_as_they_appear(live, bridge):
@@ -274,7 +274,7 @@ def test_topics_without_publishers_come_in_as_they_appear(live, bridge):
         seen = live.collect("/from_outside", STRING)
 
         def arrives():
-            talker.tell(UNICODE)
+            talker.send_line(UNICODE)
             return seen
 
         assert wait_until(arrives)
@@ -323,8 +323,8 @@ def test_rostopic_and_rosservice_know_our_own_types(live, registered, own_types)
     request, response = (message_type(f"{GO_TO}_{part}") for part in ("Request", "Response"))
     asked = []
 
-    def go_to(question):
-        asked.append(question)
+    def go_to(request):
+        asked.append(request)
         return response(True, "on the way")
 
     live.graph.create_service("/uav1/go_to", GO_TO, go_to)
@@ -333,9 +333,9 @@ def test_rostopic_and_rosservice_know_our_own_types(live, registered, own_types)
     live.publisher("/uav1/flight_state", FLIGHT_STATE, latched=True)(state)
     registered("/uav1/flight_state")
     registered("/uav1/go_to", "lookupService")
-    heard = tool("rostopic", "echo", "-n1", "/uav1/flight_state", **own_types)
-    assert 'mode: "HOLD"' in heard
-    assert "battery_charge: 0.5" in heard
+    output = tool("rostopic", "echo", "-n1", "/uav1/flight_state", **own_types)
+    assert 'mode: "HOLD"' in output
+    assert "battery_charge: 0.5" in output
     wanted = "{position: {x: 1.0, y: -2.0, z: 3.0}, yaw: 0.5}"
     assert "on the way" in tool("rosservice", "call", "/uav1/go_to", wanted, **own_types)
     assert asked == [request(Point(1.0, -2.0, 3.0), 0.5, False)]
@@ -432,11 +432,11 @@ def test_a_program_of_ours(live, registered):
         assert program.next() == "offered"
         assert wait_until(lambda: [m.data for m in seen] == ["published"])
         assert "answered" in tool("rosservice", "call", "/program")
-        program.tell("end")
+        program.send_line("end")
         assert program.next() == []
 
 
-def test_a_node_with_the_hostname_localhost_hears(live, registered):
+def test_a_node_with_the_hostname_localhost_receives(live, registered):
     """rosgraph then looks up the addresses of this machine, with a package that may be missing."""
     publish = live.publisher("/to_localhost", STRING, latched=True)
     publish(String("heard"))
@@ -446,7 +446,7 @@ def test_a_node_with_the_hostname_localhost_hears(live, registered):
 
 
 @pytest.mark.usefixtures("trigger")
-def test_a_master_that_began_anew_is_told_everything(live, master, registered, caplog):
+def test_a_restarted_master_gets_all_registrations(live, master, registered, caplog):
     publish = live.publisher("/lasting", STRING)
     registered("/lasting")
     registered("/trigger", "lookupService")
@@ -476,10 +476,10 @@ def test_no_master_is_a_clear_refusal(tmp_path):
         "try: join_ros1('late', master_uri='http://127.0.0.1:9', host='10.0.0.1')\n"
         "except BridgeError as error: print(error)\n"
     )
-    said = tool(sys.executable, "-c", program)
-    assert "no ROS master answers at http://127.0.0.1:9" in said
-    assert "'nonsense' is not the address of a ROS master" in said
-    assert "allow that with" in said
+    output = tool(sys.executable, "-c", program)
+    assert "no ROS master answers at http://127.0.0.1:9" in output
+    assert "'nonsense' is not the address of a ROS master" in output
+    assert "allow that with" in output
 
 
 def test_numpy_stays_the_environments_own():

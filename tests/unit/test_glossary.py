@@ -35,11 +35,8 @@ BANNED_IN_ALL_NAMES = {
     *("bite", "farewell", "outfit", "said", "say", "stranger", "who"),
 }
 """Words that names of functions, parameters and attributes do not contain either."""
-UNCHECKED = (
-    *("runtime/", "mavlink/autopilot/", "cli/flight.py", "bridges/logs/chunks.py"),
-    "bridges/logs/disk_file.py",  # `tell` of Python's files
-)
-"""Files and folders whose functions, parameters and attributes may still contain them."""
+UNCHECKED = ("bridges/logs/disk_file.py",)  # `tell` of Python's files
+"""Files and folders whose functions, parameters and attributes may contain them."""
 
 _NAMED = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.arg, ast.Attribute)
 

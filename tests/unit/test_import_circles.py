@@ -62,11 +62,11 @@ def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
 def circles() -> list[list[str]]:
     """The groups of modules that reach each other."""
     graph = import_graph()
-    reach = {module: reachable(graph, module) for module in graph}
+    reached = {module: reachable(graph, module) for module in graph}
     groups = {
-        tuple(sorted(other for other in reach[module] if module in reach[other]))
+        tuple(sorted(other for other in reached[module] if module in reached[other]))
         for module in graph
-        if module in reach[module]
+        if module in reached[module]
     }
     return sorted(map(list, groups), key=len)
 

@@ -19,7 +19,7 @@ def test_the_pages_airframes_are_those_of_the_data_files():
     )
 
 
-def test_every_airframe_is_told_with_all_its_rotors():
+def test_every_airframe_is_exported_with_all_its_rotors():
     text = declarations()
     for name in airframe_names():
         shape = text[text.index(f"  {name}: {{") :]

@@ -23,7 +23,7 @@ from volery_benchmarks.bridge.latency_plot import latency_plot
 from volery_benchmarks.document import read_results
 from volery_benchmarks.registry import Result
 
-PAGE, PICTURE = "bridge_latency.md", "pictures/bridge_latency.svg"
+PAGE, IMAGE = "bridge_latency.md", "pictures/bridge_latency.svg"
 _COLUMNS = {"round_trip": "round trip", "one_way": "one way", "stop": "stop"}
 _NONE = "-"
 
@@ -62,7 +62,7 @@ def render(results: Sequence[Result]) -> str:
         _HEAD,
         _SIZES,
         _size_table(first),
-        f"![Latency against the size of a message, as lines]({PICTURE})\n",
+        f"![Latency against the size of a message, as lines]({IMAGE})\n",
         "### Fitted lines\n",
         _line_table(first),
         _END_POINTS,
@@ -89,9 +89,9 @@ def bridge_results(paths: Sequence[Path]) -> list[Result]:
 def write(docs: Path, results: Sequence[Result]) -> None:
     """Writes the page and its plot below the folder `docs`."""
     text = render(results)
-    picture = docs / PICTURE
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    picture.write_text(latency_plot(results[0], fitted_line(results[0])), encoding="utf-8")
+    image_path = docs / IMAGE
+    image_path.parent.mkdir(parents=True, exist_ok=True)
+    image_path.write_text(latency_plot(results[0], fitted_line(results[0])), encoding="utf-8")
     (docs / PAGE).write_text(text, encoding="utf-8")
 
 

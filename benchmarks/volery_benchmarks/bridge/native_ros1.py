@@ -62,7 +62,7 @@ def _exchange(simulation: Simulation, plain: _Program) -> None:
         data = np.zeros(size, np.uint8)
         data.flags.writeable = False
         for _ in range(_COUNT):
-            plain.tell(str(size))
+            plain.send_line(str(size))
             time.sleep(_PERIOD_S)
             simulation.post(lambda data=data: publish(data))  # type: ignore[misc]
             time.sleep(_PERIOD_S)
@@ -74,8 +74,8 @@ def _summarize(taken: list[tuple[str, int, float]]) -> dict[str, float]:
     ratios = []
     for size in _SIZES:
         plain, ours = (
-            statistics.median(ms for path, s, ms in taken if path == way and s == size)
-            for way in ("plain", "graph")
+            statistics.median(ms for path, s, ms in taken if path == name and s == size)
+            for name in ("plain", "graph")
         )
         figures[f"rospy_ms_{size // 1000}_kb"], figures[f"ros1_ms_{size // 1000}_kb"] = plain, ours
         ratios.append(ours / plain)
@@ -115,7 +115,7 @@ class _Program:
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
 
-    def tell(self, line: str) -> None:
+    def send_line(self, line: str) -> None:
         """Sends a line."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{line}\n")
@@ -123,7 +123,7 @@ class _Program:
 
     def ask(self) -> Any:
         """Requests and returns its report."""
-        self.tell("report")
+        self.send_line("report")
         return self._next()
 
     def _next(self) -> Any:

@@ -33,8 +33,8 @@ from volery_benchmarks.hostile.websocket import (
 STALLED_CLIENTS = 50
 PUBLISHED_HZ = 10_000
 LARGE_BYTES = 60_000_000
-LARGEST_TAKEN_BYTES = 9_999_000
-MOST_HALF_OPEN = 500
+MAX_ACCEPTED_BYTES = 9_999_000
+MAX_HALF_OPEN = 500
 _STORM_PAUSE_S = 0.001
 _BURST = 100
 _CHUNK_BYTES = 1 << 20
@@ -60,8 +60,8 @@ def stalled(port: int, _ros_tcp: int, ends: float) -> int:
 
 def publisher(port: int, _ros_tcp: int, ends: float) -> int:
     """Publishes velocities 10,000 times a second with one client."""
-    told = {"op": "publish", "topic": "/uav1/cmd_vel", "msg": {"angular": {"z": 0.1}}}
-    burst = frame(json.dumps(told).encode()) * _BURST
+    message = {"op": "publish", "topic": "/uav1/cmd_vel", "msg": {"angular": {"z": 0.1}}}
+    burst = frame(json.dumps(message).encode()) * _BURST
 
     def publish() -> Iterator[int]:
         client = open_websocket(port)
@@ -91,7 +91,7 @@ def large_json(port: int, _ros_tcp: int, ends: float) -> int:
 def large_image(port: int, _ros_tcp: int, ends: float) -> int:
     """Sends images of the server's max size, as CBOR, without a pause."""
     topic = {"op": "advertise", "topic": "/hostile/image", "type": "sensor_msgs/Image"}
-    pixels = LARGEST_TAKEN_BYTES
+    pixels = MAX_ACCEPTED_BYTES
     parts = (
         b"\xa3\x62op\x67publish\x65topic\x6e/hostile/image\x63msg\xa1\x64data\x5a",
         struct.pack(">I", pixels),
@@ -104,8 +104,8 @@ def large_tf(_rosbridge: int, port: int, ends: float) -> int:
     """Sends 60 MB of transforms over ROS-TCP."""
     count = LARGE_BYTES // 76
     payload = struct.pack("<I", count) + bytes(76 * count)
-    told = json.dumps({"topic": "/tf", "message_name": "tf2_msgs/TFMessage"}).encode()
-    announced, message = _ros_tcp_frame(b"__publish", told), _ros_tcp_frame(b"/tf", payload)
+    topic = json.dumps({"topic": "/tf", "message_name": "tf2_msgs/TFMessage"}).encode()
+    announced, message = _ros_tcp_frame(b"__publish", topic), _ros_tcp_frame(b"/tf", payload)
 
     def send() -> Iterator[int]:
         client = socket.create_connection(("127.0.0.1", port), timeout=10.0)
@@ -131,7 +131,7 @@ def storm(port: int, ros_tcp: int, ends: float) -> int:
         if count % 3 == 0:
             with suppress(OSError):
                 client.send(b"GET / HTTP/1.1\r\nHost: x\r\n")
-        if len(half_open) >= MOST_HALF_OPEN:
+        if len(half_open) >= MAX_HALF_OPEN:
             half_open.pop(0).close()
     return count
 

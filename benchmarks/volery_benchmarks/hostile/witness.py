@@ -36,9 +36,9 @@ def ask(port: int, seconds: float) -> list[tuple[float, float, float]]:
                 answer = json.loads(client.recv(timeout=max(wait_s, 0.0)))
             except TimeoutError:
                 continue
-            now, told = time.monotonic(), answer["values"]["time"]
-            sim_s = told.get("sec", told.get("secs")) + 1e-9 * told.get(
-                "nanosec", told.get("nsecs")
+            now, stamp = time.monotonic(), answer["values"]["time"]
+            sim_s = stamp.get("sec", stamp.get("secs")) + 1e-9 * stamp.get(
+                "nanosec", stamp.get("nsecs")
             )
             answered.append((start + int(answer["id"]) * PERIOD_S, now, sim_s))
     return answered

@@ -43,8 +43,8 @@ def measure_crazyflow() -> Measured:
         ):
             process.round()
             times = [process.round() for _ in range(_ROUNDS)]
-            told = ", ".join(f"{k} {v}" for k, v in process.versions().items())
+            versions = ", ".join(f"{k} {v}" for k, v in process.versions().items())
     except PeerError as error:
         raise VoleryError(f"crazyflow: {error}") from None
     rate = _ENVS * _DECISIONS / statistics.median(times)
-    return Measured({"crazyflow_env_steps_per_s": rate}, {}, {"crazyflow": told})
+    return Measured({"crazyflow_env_steps_per_s": rate}, {}, {"crazyflow": versions})

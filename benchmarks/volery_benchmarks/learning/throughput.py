@@ -20,7 +20,7 @@ _ENVS = 1_024
 _THREADS = 2
 _SECONDS = 5.0
 """Wall time of the rounds of one figure."""
-_LEAST_ROUNDS = 5
+_MIN_ROUNDS = 5
 _ACTIONS = 16
 """Batches of random actions, drawn beforehand."""
 _RESETS = 30
@@ -90,7 +90,7 @@ def steps_per_s(task: Task, num_envs: int = _ENVS, *, seconds: float = _SECONDS)
         env.step(action)
     rates: list[float] = []
     end = time.perf_counter() + seconds
-    while time.perf_counter() < end or len(rates) < _LEAST_ROUNDS:
+    while time.perf_counter() < end or len(rates) < _MIN_ROUNDS:
         start = time.perf_counter()
         for action in actions:
             env.step(action)

@@ -53,10 +53,10 @@ async def _stamps(
                 text = await asyncio.wait_for(socket.recv(), left)
             except TimeoutError:
                 break
-            told: dict[str, Any] = json.loads(text)
-            if told.get("op") == "publish" and loop.time() >= begins:
-                stamp = told["msg"]["header"]["stamp"]
-                stamps[told["topic"]].append(stamp["sec"] * 10**9 + stamp["nanosec"])
+            message: dict[str, Any] = json.loads(text)
+            if message.get("op") == "publish" and loop.time() >= begins:
+                stamp = message["msg"]["header"]["stamp"]
+                stamps[message["topic"]].append(stamp["sec"] * 10**9 + stamp["nanosec"])
     return stamps
 
 

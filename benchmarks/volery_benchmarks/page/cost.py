@@ -21,12 +21,12 @@ _STATUS = "/volery/status"
 
 def stall_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
     """Returns real-time factor and memory while a client of `topics` has stopped reading."""
-    free, before = pace(server, _STALL_S / 3)
+    free, before = real_time_factor(server, _STALL_S / 3)
     with connect(server.rosbridge, max_size=None, close_timeout=1.0) as stalled:
         for topic in topics:
             stalled.send(subscription(topic))
         stalled.recv()  # the last read: what follows fills the buffers
-        held, after = pace(server, _STALL_S)
+        held, after = real_time_factor(server, _STALL_S)
     return {
         "real_time_factor": free,
         "stalled_client_rtf_loss": max(0.0, 1.0 - held / free),
@@ -42,17 +42,17 @@ def clients_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as clients:
         assert clients.stdout is not None
         clients.stdout.readline()  # all clients are connected
-        factor, _ = pace(server, _CLIENTS_S)
+        factor, _ = real_time_factor(server, _CLIENTS_S)
         out, _ = clients.communicate(timeout=10 * _CLIENTS_S)
-    told = json.loads(out)
+    counts = json.loads(out)
     return {
-        "nine_clients_lost": float(told["lost"] + told["silent"]),
-        "nine_clients_messages": float(told["messages"]),
+        "nine_clients_lost": float(counts["lost"] + counts["silent"]),
+        "nine_clients_messages": float(counts["messages"]),
         "nine_clients_real_time_factor": factor,
     }
 
 
-def pace(server: PageProcess, seconds: float) -> tuple[float, float]:
+def real_time_factor(server: PageProcess, seconds: float) -> tuple[float, float]:
     """Returns the real-time factor over `seconds`, and the memory at the end, MB."""
     with connect(server.rosbridge) as socket:
         socket.send(json.dumps({"op": "subscribe", "topic": _STATUS, "queue_length": 1}))
@@ -65,8 +65,8 @@ def pace(server: PageProcess, seconds: float) -> tuple[float, float]:
 
 
 def _status(text: str | bytes) -> dict[str, Any]:
-    told: dict[str, Any] = json.loads(text)["msg"]
-    return told
+    status: dict[str, Any] = json.loads(text)["msg"]
+    return status
 
 
 def _seconds(stamp: dict[str, int]) -> float:

@@ -19,7 +19,7 @@ from volery.core.errors import VoleryError
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-_PATIENCE_MS = 120_000
+_TIMEOUT_MS = 120_000
 _FRAMES = 150
 _GLANCE_MS = 20
 _STATIC = Path(str(files("volery.server") / "static"))
@@ -40,36 +40,36 @@ _SCRIPT_OF_FRAMES = """async (frames) => {
 def looking(browser: Browser, url: str, width: int = 640, height: int = 360) -> Iterator[Page]:
     """Opens the page in its own window, panels closed; yields after the first frame."""
     context = browser.new_context(viewport={"width": width, "height": height})
-    context.set_default_timeout(_PATIENCE_MS)
+    context.set_default_timeout(_TIMEOUT_MS)
     try:
         page = context.new_page()
         page.goto(url)
-        wait_for_picture(page)
+        wait_for_image(page)
         yield page
     finally:
         context.close()
 
 
-def wait_for_picture(page: Page) -> None:
+def wait_for_image(page: Page) -> None:
     """Waits until the world has been drawn."""
-    wait_until(page, "window.volery !== undefined && window.volery.firstPictureMs > 0")
+    wait_until(page, "window.volery !== undefined && window.volery.firstRenderMs > 0")
 
 
-def wait_until(page: Page, condition: str, patience_s: float = _PATIENCE_MS / 1000.0) -> None:
-    """Waits until an expression holds in the page. Raises `VoleryError` after `patience_s`.
+def wait_until(page: Page, condition: str, timeout_s: float = _TIMEOUT_MS / 1000.0) -> None:
+    """Waits until an expression holds in the page. Raises `VoleryError` after `timeout_s`.
 
     The page's content policy forbids Playwright's own waiting.
     """
-    end = time.monotonic() + patience_s
+    end = time.monotonic() + timeout_s
     while not page.evaluate(condition):
         if time.monotonic() > end:
-            raise VoleryError(f"the page took more than {patience_s:g} s until {condition}")
+            raise VoleryError(f"the page took more than {timeout_s:g} s until {condition}")
         page.wait_for_timeout(_GLANCE_MS)
 
 
-def first_picture_s(page: Page) -> float:
+def first_image_s(page: Page) -> float:
     """Returns the time from the request to the first frame with the world, s."""
-    return float(page.evaluate("window.volery.firstPictureMs")) / 1000.0
+    return float(page.evaluate("window.volery.firstRenderMs")) / 1000.0
 
 
 def initial_script_mb(page: Page) -> float:
@@ -77,7 +77,7 @@ def initial_script_mb(page: Page) -> float:
     fetched = page.evaluate(
         """() => performance.getEntriesByType("resource")
             .filter(({name, startTime}) => name.endsWith(".js")
-                && startTime < window.volery.firstPictureMs)
+                && startTime < window.volery.firstRenderMs)
             .map(({name}) => name)"""
     )
     names = {PurePosixPath(urlsplit(url).path).name for url in fetched}

@@ -16,9 +16,9 @@ import numpy as np
 from volery.core.errors import VoleryError
 from volery_benchmarks.page import worlds
 from volery_benchmarks.page.browser import open_browser
-from volery_benchmarks.page.cost import clients_figures, pace, stall_figures
+from volery_benchmarks.page.cost import clients_figures, real_time_factor, stall_figures
 from volery_benchmarks.page.looking import (
-    first_picture_s,
+    first_image_s,
     frame_work,
     heap_bytes,
     initial_script_mb,
@@ -86,7 +86,7 @@ def _opening(browser: Browser) -> dict[str, float]:
     with PageProcess("hover", "--seconds", "1e6") as server:
         for _ in range(_OPENINGS):
             with looking(browser, server.url) as page:
-                times.append(first_picture_s(page))
+                times.append(first_image_s(page))
                 script_mb = initial_script_mb(page)
     return {"bundle_initial_mb": script_mb, "first_picture_s": float(np.median(times))}
 
@@ -113,7 +113,7 @@ def _large_crowd(browser: Browser, uavs: int) -> dict[str, float]:
     """Returns the age of what is shown of a crowd, and the real-time factor meanwhile."""
     with _serving(worlds.crowd(uavs)) as server, looking(browser, server.url, 320, 180) as page:
         page.wait_for_timeout(1000 * _AGE_S)  # until the clocks are synchronized
-        factor, _ = pace(server, _AGE_S)
+        factor, _ = real_time_factor(server, _AGE_S)
         return {
             f"age_p95_ms_{uavs}_uavs": shown_age_ms(page, _AGE_S),
             f"real_time_factor_{uavs}_uavs": factor,

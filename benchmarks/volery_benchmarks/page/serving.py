@@ -42,7 +42,7 @@ class PageProcess:
         self._command = [sys.executable, "-P", "-m", "volery", "serve", *named, *options]
         self._process: subprocess.Popen[str] | None = None
         self._reader = threading.Thread()
-        self._said: deque[str] = deque(maxlen=50)
+        self._output: deque[str] = deque(maxlen=50)
 
     @property
     def url(self) -> str:
@@ -77,7 +77,7 @@ class PageProcess:
         self._reader.start()
         try:
             if not listening.wait(_STARTING_S) or self._process.poll() is not None:
-                raise VoleryError(f"the server did not start: {''.join(self._said)}")
+                raise VoleryError(f"the server did not start: {''.join(self._output)}")
             self.wait_until_flying()
         except BaseException:
             self.stop()
@@ -101,8 +101,8 @@ class PageProcess:
     def status(self) -> dict[str, Any]:
         """Returns the content of `./api/status`."""
         with urllib.request.urlopen(f"{self.url}api/status", timeout=10.0) as answer:
-            told: dict[str, Any] = json.load(answer)
-            return told
+            status: dict[str, Any] = json.load(answer)
+            return status
 
     def wait_until_flying(self) -> None:
         """Waits until a simulation runs."""
@@ -112,7 +112,7 @@ class PageProcess:
                 if self.status()["state"] == "flying":
                     return
             time.sleep(0.05)
-        raise VoleryError(f"no simulation runs: {''.join(self._said)}")
+        raise VoleryError(f"no simulation runs: {''.join(self._output)}")
 
     def __enter__(self) -> PageProcess:
         """Starts the server."""
@@ -125,7 +125,7 @@ class PageProcess:
 
     def _read(self, process: subprocess.Popen[str], listening: threading.Event) -> None:
         for line in process.stdout or ():
-            self._said.append(line)
+            self._output.append(line)
             address = _URL.search(line)
             if address is not None and not listening.is_set():
                 self.port = int(address[1])

@@ -20,7 +20,7 @@ from volery_benchmarks.registry import Measured
 
 _SCRIPTS = Path(__file__).parent
 _LOG = logging.getLogger(__name__)
-_FEWEST_ROUNDS, _MOST_ROUNDS = 5, 40
+_FEWEST_ROUNDS, _MAX_ROUNDS = 5, 40
 _SECONDS = 15.0
 """Time of repeated rounds for each contest, s."""
 
@@ -86,8 +86,8 @@ class _Match:
         if python is not None:
             request = {**self._task.request, "packages": self._peer.packages}
             try:
-                with PeerProcess(python, script, request, folder) as conversation:
-                    return self._beside(conversation)
+                with PeerProcess(python, script, request, folder) as peer:
+                    return self._beside(peer)
             except PeerError as failure:
                 name = f"{self._peer.name}_{self._contest.case}"
                 _LOG.info("%s: %s", name, failure)
@@ -96,27 +96,27 @@ class _Match:
         self._task.check(None)
         return Measured(self._figures("ours_", self._task.amount / ours), failures)
 
-    def _beside(self, conversation: PeerProcess) -> Measured:
-        versions = conversation.versions()
-        ours, theirs = _medians([self._ours, conversation.round], self._seconds)
-        further = self._task.check(conversation.facts())
+    def _beside(self, peer: PeerProcess) -> Measured:
+        versions = peer.versions()
+        ours, theirs = _medians([self._ours, peer.round], self._seconds)
+        further = self._task.check(peer.facts())
         our_speed, speed = self._task.amount / ours, self._task.peer_amount / theirs
         figures = {**self._figures("ours_", our_speed), **self._figures("", speed)}
         figures[self._name("ratio")] = our_speed / speed
         figures.update((self._name(what), value) for what, value in further.items())
-        told = ", ".join(f"{name} {version}" for name, version in versions.items())
-        return Measured(figures, {}, {self._peer.name: told})
+        peer_versions = ", ".join(f"{name} {version}" for name, version in versions.items())
+        return Measured(figures, {}, {self._peer.name: peer_versions})
 
     def _ours(self) -> float:
         start = time.perf_counter()
         self._task.ours()
         return time.perf_counter() - start
 
-    def _figures(self, whose: str, per_s: float) -> dict[str, float]:
-        figures = {self._name(f"{whose}{self._contest.unit}_per_s"): per_s}
+    def _figures(self, prefix: str, per_s: float) -> dict[str, float]:
+        figures = {self._name(f"{prefix}{self._contest.unit}_per_s"): per_s}
         if self._task.simulated_per_s is not None:
             factor = per_s / self._task.simulated_per_s
-            figures[self._name(f"{whose}real_time_factor")] = factor
+            figures[self._name(f"{prefix}real_time_factor")] = factor
         return figures
 
     def _name(self, what: str) -> str:
@@ -129,7 +129,7 @@ def _medians(rounds: Sequence[Callable[[], float]], seconds: float) -> list[floa
     for each in rounds:
         each()
     end = time.perf_counter() + seconds
-    for number in range(_MOST_ROUNDS):
+    for number in range(_MAX_ROUNDS):
         if number >= _FEWEST_ROUNDS and time.perf_counter() > end:
             break
         for each, values in zip(rounds, taken, strict=True):

@@ -34,11 +34,11 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
     )
     sim.reset()
     shape = (request["worlds"], request["drones"])
-    places = np.broadcast_to(np.float32(request["places"]), (*shape, 3))
-    states = sim.data.states.replace(pos=jax.numpy.asarray(places))
+    positions = np.broadcast_to(np.float32(request["places"]), (*shape, 3))
+    states = sim.data.states.replace(pos=jax.numpy.asarray(positions))
     sim.data = sim.data.replace(states=states)
     command = np.zeros((*shape, _COMMAND), np.float32)
-    command[..., :3] = places
+    command[..., :3] = positions
     command[..., _QUATERNION_W] = 1.0
     sim.state_control(command)
 
@@ -48,6 +48,6 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
 
     def facts() -> dict[str, Any]:
         now = np.asarray(sim.data.states.pos)
-        return {"position_error_m": float(np.linalg.norm(now - places, axis=-1).max())}
+        return {"position_error_m": float(np.linalg.norm(now - positions, axis=-1).max())}
 
     return advance, facts

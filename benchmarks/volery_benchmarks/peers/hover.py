@@ -22,7 +22,7 @@ from volery_benchmarks.peers.catalogue import RATE_HZ, HoverContest
 from volery_benchmarks.peers.failure import PeerError
 from volery_benchmarks.peers.task import Task
 
-FARTHEST_M = 0.5
+MAX_DISTANCE_M = 0.5
 """Max position error of a hover, m; beyond it speeds are not compared. Modelling choice."""
 _APART_M, _ALTITUDE_M = 2.0, 10.0
 _STEPS = 500
@@ -30,16 +30,16 @@ _STEPS = 500
 
 def hover_task(contest: HoverContest) -> Task:
     """Prepares the contest."""
-    places = _places(contest.vehicles)
-    fleet = _fleet(places)
+    positions = _positions(contest.vehicles)
+    fleet = _fleet(positions)
     terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
 
     def advance() -> None:
         fleet.advance(_STEPS, terrain)
 
     def check(facts: Mapping[str, Any] | None) -> dict[str, float]:
-        ours = float(np.linalg.norm(fleet.state.position_map - places, axis=1).max())
-        if not ours <= FARTHEST_M:
+        ours = float(np.linalg.norm(fleet.state.position_map - positions, axis=1).max())
+        if not ours <= MAX_DISTANCE_M:
             raise AssertionError(f"a UAV of ours is {ours:.3g} m from its position")
         if facts is not None:
             check_hover(facts)
@@ -52,7 +52,7 @@ def hover_task(contest: HoverContest) -> Task:
         {
             "worlds": contest.worlds,
             "drones": contest.drones,
-            "places": _places(contest.drones).tolist(),
+            "places": _positions(contest.drones).tolist(),
             "steps": contest.steps,
             "rate_hz": RATE_HZ,
         },
@@ -67,13 +67,13 @@ def check_hover(facts: Mapping[str, Any]) -> None:
     error = facts.get("position_error_m")
     if not isinstance(error, int | float):
         raise PeerError("does not report position_error_m")
-    if not error <= FARTHEST_M:
+    if not error <= MAX_DISTANCE_M:
         raise PeerError(
-            f"a drone is {error:.3g} m from its position; up to {FARTHEST_M:g} m is hovering"
+            f"a drone is {error:.3g} m from its position; up to {MAX_DISTANCE_M:g} m is hovering"
         )
 
 
-def _places(count: int) -> Array:
+def _positions(count: int) -> Array:
     """Returns positions (count, 3), m."""
     across = int(np.ceil(np.sqrt(count)))
     row, column = np.divmod(np.arange(count), across)
@@ -81,11 +81,11 @@ def _places(count: int) -> Array:
     return np.column_stack([_APART_M * column, _APART_M * row, altitude])
 
 
-def _fleet(places: Array) -> Fleet:
-    count = len(places)
+def _fleet(positions: Array) -> Fleet:
+    count = len(positions)
     attitude = rotations.from_rpy(np.zeros(count), 0.0, np.zeros(count))
     airframes = [load_airframe("f450")] * count
-    fleet = Fleet(airframes, places, attitude, dt_ns=NS_PER_S // RATE_HZ)
+    fleet = Fleet(airframes, positions, attitude, dt_ns=NS_PER_S // RATE_HZ)
     for i in range(count):
-        fleet.command_position(i, places[i], yaw=0.0)
+        fleet.command_position(i, positions[i], yaw=0.0)
     return fleet

@@ -15,7 +15,7 @@ import pybullet
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
     """Returns functions: a round on one thread; facts that save the distances to a file."""
     data = np.load(request["arrays"])
-    reach = request["reach_m"]
+    max_range = request["reach_m"]
     pybullet.connect(pybullet.DIRECT)
     vertices, triangles = data["vertices"], data["triangles"]
     for i in range(len(data["first_triangle"]) - 1):
@@ -28,7 +28,7 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
         )
         pybullet.createMultiBody(0, shape)
-    origins, ends = data["origins"], data["origins"] + reach * data["directions"]
+    origins, ends = data["origins"], data["origins"] + max_range * data["directions"]
     # lists, which PyBullet processes faster than arrays; their conversion is not measured
     batches = [
         (origins[i : i + request["batch"]].tolist(), ends[i : i + request["batch"]].tolist())
@@ -40,7 +40,7 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
 
     def facts() -> dict[str, Any]:
         hits = [hit for batch in cast() for hit in batch]
-        distance = [reach * hit[2] if hit[0] >= 0 else np.inf for hit in hits]
+        distance = [max_range * hit[2] if hit[0] >= 0 else np.inf for hit in hits]
         np.save(request["distances"], np.array(distance))
         return {}
 

@@ -16,18 +16,18 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
     """Returns functions: a round of `steps`; the drones' max position error, m."""
     if request["worlds"] != 1:
         raise ValueError("an Aviary is one world")
-    places = np.array(request["places"])
+    positions = np.array(request["places"])
     aviary = Aviary(
-        start_pos=places,
-        start_orn=np.zeros_like(places),
+        start_pos=positions,
+        start_orn=np.zeros_like(positions),
         drone_type="quadx",
         drone_options={"control_hz": request["rate_hz"]},
         physics_hz=request["rate_hz"],
         seed=1,
     )
     aviary.set_mode(_POSITION)
-    yaw = np.zeros(len(places))
-    aviary.set_all_setpoints(np.column_stack([places[:, :2], yaw, places[:, 2]]))
+    yaw = np.zeros(len(positions))
+    aviary.set_all_setpoints(np.column_stack([positions[:, :2], yaw, positions[:, 2]]))
 
     def advance() -> None:
         for _ in range(request["steps"]):
@@ -35,6 +35,6 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
 
     def facts() -> dict[str, Any]:
         now = np.array([state[3] for state in aviary.all_states])
-        return {"position_error_m": float(np.linalg.norm(now - places, axis=1).max())}
+        return {"position_error_m": float(np.linalg.norm(now - positions, axis=1).max())}
 
     return advance, facts

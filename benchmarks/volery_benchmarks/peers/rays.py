@@ -18,13 +18,20 @@ from volery.core.arrays import Array
 from volery.world.mesh import Mesh
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
-from volery_benchmarks.forest_beams import PIECE_M, REACH_M, flattened, forest_of, rays_of, scans_of
+from volery_benchmarks.forest_beams import (
+    MAX_RANGE_M,
+    PIECE_M,
+    flattened,
+    forest_of,
+    rays_of,
+    scans_of,
+)
 from volery_benchmarks.peers.catalogue import RayContest
 from volery_benchmarks.peers.failure import PeerError
 from volery_benchmarks.peers.task import Task
 
 TOLERANCE_M = 0.01
-LEAST_AGREEMENT = 0.99
+MIN_AGREEMENT = 0.99
 """Min fraction of rays that must agree before speeds are compared; the rest graze edges of
 leaves. Modelling choice."""
 
@@ -40,33 +47,33 @@ def ray_task(contest: RayContest, folder: Path) -> Task:
     count = contest.uavs * batch
     origins, directions = origins[:count], directions[:count]
     parts = [slice(i, i + batch) for i in range(0, count, batch)]
-    hits = scene.cast(origins[:batch], directions[:batch], REACH_M)
+    hits = scene.cast(origins[:batch], directions[:batch], MAX_RANGE_M)
     expected = np.concatenate(
-        [scene.cast(origins[part], directions[part], REACH_M).distance for part in parts]
+        [scene.cast(origins[part], directions[part], MAX_RANGE_M).distance for part in parts]
     )
     arrays, distances = folder / "rays.npz", folder / "distances.npy"
     write_rays(arrays, flattened(terrain, forest), origins, directions)
 
     def cast() -> None:
         for part in parts:
-            scene.cast(origins[part], directions[part], REACH_M, out=hits)
+            scene.cast(origins[part], directions[part], MAX_RANGE_M, out=hits)
 
     def check(facts: Mapping[str, Any] | None) -> dict[str, float]:
         if facts is None:
             return {}
-        share = agreement(expected, read_distances(distances, count))
-        if share < LEAST_AGREEMENT:
+        fraction = agreement(expected, read_distances(distances, count))
+        if fraction < MIN_AGREEMENT:
             raise PeerError(
-                f"only {share:.1%} of its distances are within {100 * TOLERANCE_M:g} cm of ours; "
-                f"{LEAST_AGREEMENT:.0%} are needed for a comparison"
+                f"only {fraction:.1%} of its distances are within {100 * TOLERANCE_M:g} cm of "
+                f"ours; {MIN_AGREEMENT:.0%} are needed for a comparison"
             )
-        return {"agreement": share}
+        return {"agreement": fraction}
 
     request = {
         "arrays": str(arrays),
         "distances": str(distances),
         "batch": batch,
-        "reach_m": REACH_M,
+        "reach_m": MAX_RANGE_M,
     }
     return Task(cast, count, count, request, check, scene.close)
 

@@ -103,9 +103,9 @@ def _ends_of(token: str, name: str, starts: set[int]) -> set[int]:
         return {start + 1 for start in starts if name[start : start + 1] not in ("", "/")}
     if token == "*":
         ends, inside = set(), False
-        for place in range(len(name) + 1):
-            inside = place in starts or (inside and name[place - 1] != "/")
+        for index in range(len(name) + 1):
+            inside = index in starts or (inside and name[index - 1] != "/")
             if inside:
-                ends.add(place)
+                ends.add(index)
         return ends
     return {start + len(token) for start in starts if name.startswith(token, start)}

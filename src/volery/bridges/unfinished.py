@@ -49,7 +49,7 @@ class UnfinishedMessages:
     def __init__(self, max_bytes: int = MAX_UNFINISHED_BYTES) -> None:
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
-        self._shares: dict[UnfinishedBytes, int] = {}
+        self._held_bytes: dict[UnfinishedBytes, int] = {}
         """Bytes of each client that has some, in the order in which they began."""
         self._total = 0
         self._waiting: dict[UnfinishedBytes, None] = {}
@@ -65,7 +65,7 @@ class UnfinishedMessages:
     @property
     def is_crowded(self) -> bool:
         """Whether so many clients have bytes here that they are read in turns."""
-        return len(self._shares) > _FEW
+        return len(self._held_bytes) > _FEW
 
     def open(
         self, evict: Callable[[], None], resume: Callable[[], None] = lambda: None
@@ -77,11 +77,11 @@ class UnfinishedMessages:
         """
         return UnfinishedBytes(self, evict, resume)
 
-    def hold(self, share: UnfinishedBytes, size: int, *, may_wait: bool) -> bool:
+    def hold(self, budget: UnfinishedBytes, size: int, *, may_wait: bool) -> bool:
         """Counts the bytes of a client; used by `UnfinishedBytes`."""
         evicted: list[UnfinishedBytes] = []
         with self._lock:
-            before = self._set(share, size)
+            before = self._set(budget, size)
             has_room = self._total <= self._max_bytes or size <= before
             if not has_room:
                 part = self._part()
@@ -89,13 +89,13 @@ class UnfinishedMessages:
                     evicted = self._evict_beyond(part)
                     has_room = True
                 elif may_wait:
-                    self._waiting[share] = None
+                    self._waiting[budget] = None
                 else:
-                    self._set(share, before)
+                    self._set(budget, before)
             resumed = self._next_waiting()
-            if share in self._waiting and size < min(before, self._part()):
-                del self._waiting[share]
-                resumed.append(share)
+            if budget in self._waiting and size < min(before, self._part()):
+                del self._waiting[budget]
+                resumed.append(budget)
             returns = self._returns_memory()
         for other in evicted:
             other.evict()
@@ -107,15 +107,15 @@ class UnfinishedMessages:
 
     def _part(self) -> int:
         """Returns the equal part of each client that has bytes here."""
-        return self._max_bytes // max(1, len(self._shares))
+        return self._max_bytes // max(1, len(self._held_bytes))
 
-    def _set(self, share: UnfinishedBytes, size: int) -> int:
+    def _set(self, budget: UnfinishedBytes, size: int) -> int:
         """Sets the bytes of a client, and returns those of before."""
-        before = self._shares.get(share, 0)
+        before = self._held_bytes.get(budget, 0)
         if size:
-            self._shares[share] = size
+            self._held_bytes[budget] = size
         else:
-            self._shares.pop(share, None)
+            self._held_bytes.pop(budget, None)
         self._total += size - before
         self._freed += max(0, before - size)
         return before
@@ -141,21 +141,21 @@ class UnfinishedMessages:
     def _evict_beyond(self, part: int) -> list[UnfinishedBytes]:
         """Makes room: removes clients with more than an equal part, oldest messages first."""
         found = []
-        for share, size in tuple(self._shares.items()):
+        for budget, size in tuple(self._held_bytes.items()):
             if self._total <= self._max_bytes:
                 break
             if size > part + _READ_BYTES:
-                self._set(share, 0)
-                self._waiting.pop(share, None)
-                found.append(share)
+                self._set(budget, 0)
+                self._waiting.pop(budget, None)
+                found.append(budget)
         return found
 
     def _next_waiting(self) -> list[UnfinishedBytes]:
         """Returns clients for which there is room again, in the order of waiting."""
         room = (self._max_bytes - self._total) // _READ_BYTES
         found = list(self._waiting)[:room] if room > 0 and self._waiting else []
-        for share in found:
-            del self._waiting[share]
+        for budget in found:
+            del self._waiting[budget]
         return found
 
 
@@ -261,7 +261,7 @@ class ArrivingMessages:
         self._account = account
         self._turns = _turns.setdefault(loop, _ReadTurns())
         self._has_room = self._has_turn = True
-        self._share = account.open(
+        self._budget = account.open(
             lambda: self._post(lambda: self._end_once(NO_ROOM)), lambda: self._post(self._room)
         )
         self._began_s: float | None = None
@@ -287,7 +287,7 @@ class ArrivingMessages:
             self._began_s = None
         elif self._began_s is None:
             self.restart()
-        if not self._share.hold(incomplete + waiting, may_wait=True):
+        if not self._budget.hold(incomplete + waiting, may_wait=True):
             self._has_room = False
 
     def _take_turns(self) -> None:
@@ -331,7 +331,7 @@ class ArrivingMessages:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        self._share.close()
+        self._budget.close()
         if self._account.owes_memory():
             self._turns.return_memory_soon(self._loop, self._account)
 

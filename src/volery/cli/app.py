@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.error_reporting import word_logs
+from volery.cli.error_reporting import format_logs
 from volery.cli.examples import examples
 from volery.cli.flight_commands import (
     launch,
@@ -101,7 +101,7 @@ app.add_typer(service_app, name="service")
 
 def main() -> None:
     """Entry point of the command `volery`."""
-    word_logs()
+    format_logs()
     show_node_logs()
     app()
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 BUILT_IN = ("mavlink", "mavlink-tcp", "mavlink-serial")
 """Bridges to Volery's built-in autopilot."""
 
-_OUTSIDE = ("px4", "px4-serial", "ardupilot")
+_EXTERNAL_AUTOPILOTS = ("px4", "px4-serial", "ardupilot")
 """Bridges to external autopilots, which control the UAVs."""
 _EVERY = ("px4", "ardupilot")
 """External autopilots that control all UAVs of a run."""
@@ -39,19 +39,19 @@ def check_bridges(options: RunOptions) -> None:
         raise BridgeError(
             "--mavlink-key signs MAVLink, and no such bridge is open: --bridge mavlink"
         )
-    heeds_silence = any(name in _OUTSIDE for name in names)
+    heeds_silence = any(name in _EXTERNAL_AUTOPILOTS for name in names)
     waits_otherwise = options.autopilot_timeout_s != RunOptions.autopilot_timeout_s
     if (options.drop_on_timeout or waits_otherwise) and not heeds_silence:
         raise BridgeError(
             "--autopilot-timeout and --drop-on-timeout are for external autopilots; none of their "
-            f"bridges is open: --bridge {', '.join(_OUTSIDE)}"
+            f"bridges is open: --bridge {', '.join(_EXTERNAL_AUTOPILOTS)}"
         )
     domains = [text for text in options.bridges if text.partition("=")[0] in _ROS2]
     if options.domain_id is not None and all(text.startswith("ros2=") for text in domains):
-        said = (
+        rule = (
             f"{', '.join(domains)} has its own" if domains else "no bridge to ROS 2 is open: --ros2"
         )
-        raise BridgeError(f"--domain-id {options.domain_id}: {said}")
+        raise BridgeError(f"--domain-id {options.domain_id}: {rule}")
     if options.interfaces and "ros2" not in names:
         raise BridgeError(
             "--ros2-interface is for ROS 2 over DDS, and no such bridge is open: --ros2"
@@ -87,29 +87,29 @@ def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
     from volery.mavlink.scenario_setup import NODE
     from volery.scenario.node_names import is_same_node
 
-    outside = [name for name in _names(options) if name in _OUTSIDE]
+    external = [name for name in _names(options) if name in _EXTERNAL_AUTOPILOTS]
     used = {group.type for group in scenario.uavs}
     for name, uav_type in scenario.types.items():
         has_own = any(is_same_node(entry.node, NODE) for entry in uav_type.nodes)
-        if outside and name in used and has_own:
+        if external and name in used and has_own:
             raise BridgeError(
                 f"scenario '{scenario.name}', type '{name}': has an autopilot of its own "
-                f"({NODE}); --bridge {outside[0]} would bring a second one"
+                f"({NODE}); --bridge {external[0]} would bring a second one"
             )
 
 
 def _check_autopilots(names: list[str]) -> None:
     built_in = next((name for name in names if name in BUILT_IN), None)
-    outside = [name for name in names if name in _OUTSIDE]
-    if built_in is not None and outside:
+    external = [name for name in names if name in _EXTERNAL_AUTOPILOTS]
+    if built_in is not None and external:
         raise BridgeError(
-            f"--bridge {built_in} and --bridge {outside[0]} would give each UAV two autopilots; "
-            f"the one at {outside[0]} speaks MAVLink by itself, at its own ports"
+            f"--bridge {built_in} and --bridge {external[0]} would give each UAV two autopilots; "
+            f"the one at {external[0]} speaks MAVLink by itself, at its own ports"
         )
-    every = next((name for name in outside if name in _EVERY), None)
-    if every is not None and len(outside) > 1:
+    every = next((name for name in external if name in _EVERY), None)
+    if every is not None and len(external) > 1:
         raise BridgeError(
-            f"--bridge {' and --bridge '.join(outside)} would give UAVs two autopilots: "
+            f"--bridge {' and --bridge '.join(external)} would give UAVs two autopilots: "
             f"{every} serves all of them"
         )
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from volery.runtime.vehicles.uav import Uav
     from volery.scenario.schema import Scenario
 
-_LONGEST_START_S = 60.0
+_START_TIMEOUT_S = 60.0
 """Wall time within which all PX4 instances must connect."""
 _LOOK_S = 0.05
 
@@ -107,7 +107,7 @@ def _px4_instances(
     bridge = next(bridge for bridge in bridges if isinstance(bridge, Px4Bridge))
     with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
         echo_line(f"started {build.binary}, instances 0 to {count - 1}", err=True)
-        end_s = time.monotonic() + _LONGEST_START_S
+        end_s = time.monotonic() + _START_TIMEOUT_S
         while len(bridge.connected) < count:
             if instances.wait(_LOOK_S) or time.monotonic() > end_s:
                 raise BridgeError(instances.failure or _missing(uavs, bridge, instances))
@@ -118,7 +118,7 @@ def _missing(names: Iterable[str], bridge: Px4Bridge, instances: Px4Instances) -
     """Returns an error text with the missing PX4s, their addresses and last output."""
     return "\n  ".join(
         f"{uav}: PX4 {number} has not connected to {bridge.address(number)} within "
-        f"{_LONGEST_START_S:g} s; last output:{instances.words_of(number) or ' nothing'}"
+        f"{_START_TIMEOUT_S:g} s; last output:{instances.output_of(number) or ' nothing'}"
         for number, uav in enumerate(names)
         if uav not in bridge.connected
     )

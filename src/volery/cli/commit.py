@@ -46,8 +46,8 @@ def read_commit(checkout: Path) -> Commit | None:
     return Commit(head, is_changed=bool(changes)) if head and changes is not None else None
 
 
-def _git(checkout: Path, *words: str) -> str | None:
-    command = ["git", "--no-optional-locks", "-C", str(checkout), *words]
+def _git(checkout: Path, *args: str) -> str | None:
+    command = ["git", "--no-optional-locks", "-C", str(checkout), *args]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=_GIT_TIMEOUT_S, check=True

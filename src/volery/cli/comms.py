@@ -11,7 +11,7 @@ from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
 from volery.comms.server.tcp import CommsServer
 
-_TOLD_S = 10.0
+_SUMMARY_PERIOD_S = 10.0
 
 
 def serve_stations(host: str, port: int, settings: RouterSettings, *, anywhere: bool) -> None:
@@ -37,15 +37,15 @@ async def _serve(server: CommsServer) -> None:
         loop.add_signal_handler(number, end, number)
     await server.start()
     echo_line(f"open    {server.name}")
-    said = ""
+    last_line = ""
     try:
         while not ended.is_set():
             with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
-                await asyncio.wait_for(ended.wait(), _TOLD_S)
+                await asyncio.wait_for(ended.wait(), _SUMMARY_PERIOD_S)
             line = summary(server.statistics)
-            if line != said:
+            if line != last_line:
                 echo_line(line)
-            said = line
+            last_line = line
     finally:
         await server.stop()
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-WAYS = "rosbridge://HOST:PORT, ros1, ros2, ros2-zenoh, rclpy or mavlink://ADDRESS"
-ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
+CONNECTION_FORMS = "rosbridge://HOST:PORT, ros1, ros2, ros2-zenoh, rclpy or mavlink://ADDRESS"
+ROS2_SCHEMES = ("ros2", "ros2-zenoh", "rclpy")
 TIMEOUT_S = 30.0
 """Wall time for which a node in its own process waits for its graph; a world may take long to
 build."""
@@ -37,7 +37,7 @@ def open_link(via: str, name: str) -> GraphConnection:
         from volery.bridges.ros1.client import Ros1Client
 
         return Ros1Client(f"http://{rest}" if rest else None, _own_name(name))
-    if scheme in ROS2_WAYS:
+    if scheme in ROS2_SCHEMES:
         from volery.bridges.ros2.client import Ros2Client
 
         return Ros2Client(_ros2_terms(via), f"/{_own_name(name)}")
@@ -48,21 +48,21 @@ def open_link(via: str, name: str) -> GraphConnection:
         if not address or option not in ("", "engage"):
             raise BridgeError(f"'{via}': the form is mavlink://udpin:HOST:PORT, or with ?engage")
         return OffboardConnection(address, name, engages=option == "engage")
-    raise _no_way(via)
+    raise _unknown_connection(via)
 
 
 def await_link(via: str, name: str, timeout_s: float = TIMEOUT_S) -> GraphConnection:
     """Joins like `open_link`, but waits up to `timeout_s` for a graph that starts later."""
     until = time.monotonic() + timeout_s
-    told = False
+    has_reported = False
     while True:
         try:
             return open_link(via, name)
         except UnreachableError as error:
             if time.monotonic() >= until:
                 raise
-            if not told:
-                told = True
+            if not has_reported:
+                has_reported = True
                 echo_line(f"{error}; waiting up to {timeout_s:.0f} s", err=True)
             time.sleep(_AGAIN_S)
 
@@ -75,7 +75,7 @@ def join_late(late: DeferredConnection, host: NodeHost) -> GraphConnection:
     return link
 
 
-class ConnectionOptions:
+class ConnectionMonitor:
     """Prints when the connection breaks and when it is back, at each call.
 
     Serves as the end condition of `NodeHost.spin`; the condition never holds.
@@ -105,17 +105,17 @@ def _ros2_terms(via: str) -> Ros2Environment:
     from volery.bridges.ros2.environment import Ros2Environment
 
     parts = urlsplit(via)
-    asked = parse_qs(parts.query, keep_blank_values=True)
+    query = parse_qs(parts.query, keep_blank_values=True)
     kind = via.partition("://")[0]
     zenoh = kind == "ros2-zenoh"
-    domain = asked.pop("domain", [""])[-1] if zenoh else parts.netloc
-    interfaces = tuple(asked.pop("interface", ())) if kind == "ros2" else ()
-    if asked:
+    domain = query.pop("domain", [""])[-1] if zenoh else parts.netloc
+    interfaces = tuple(query.pop("interface", ())) if kind == "ros2" else ()
+    if query:
         known = {"ros2": "interface", "ros2-zenoh": "domain"}.get(kind)
         hint = f"{kind} supports {known}" if known else f"{kind} has no options"
-        raise BridgeError(f"'{via}': unknown option '{next(iter(asked))}'; {hint}")
+        raise BridgeError(f"'{via}': unknown option '{next(iter(query))}'; {hint}")
     if parts.path.strip("/") not in ("", kind) or parts.fragment:
-        raise _no_way(via)
+        raise _unknown_connection(via)
     if domain and not domain.isdecimal():
         raise BridgeError(f"'{via}': a domain is a number from 0 to 232, not '{domain}'")
     domain_id = int(domain) if domain else None
@@ -124,8 +124,8 @@ def _ros2_terms(via: str) -> Ros2Environment:
     return Ros2Environment("rclpy" if kind == "rclpy" else "dds", domain_id, interfaces)
 
 
-def _no_way(via: str) -> BridgeError:
-    return BridgeError(f"'{via}' is not a graph connection; use {WAYS}")
+def _unknown_connection(via: str) -> BridgeError:
+    return BridgeError(f"'{via}' is not a graph connection; use {CONNECTION_FORMS}")
 
 
 def _own_name(name: str) -> str:

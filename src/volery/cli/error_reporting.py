@@ -22,11 +22,11 @@ from volery.core.plain_text import plain_message
 P = ParamSpec("P")
 
 USER_ERROR = 2
-_SMALLEST, _LARGEST = 1e-9, 1e9
+_MIN_OPTION, _MAX_OPTION = 1e-9, 1e9
 _shows_traceback: ContextVar[bool] = ContextVar("volery_shows_traceback", default=False)
 
 
-class _Words(logging.Formatter):
+class _LogFormatter(logging.Formatter):
     """Formats a log record's level like `complain` and `warn`."""
 
     def format(self, record: logging.LogRecord) -> str:
@@ -38,10 +38,10 @@ class _Words(logging.Formatter):
         return plain_message(super().formatMessage(record))
 
 
-def word_logs() -> None:
+def format_logs() -> None:
     """Formats records of the package's loggers like messages of its commands."""
     if logging.lastResort is not None:
-        logging.lastResort.setFormatter(_Words())
+        logging.lastResort.setFormatter(_LogFormatter())
 
 
 def complain(text: str) -> None:
@@ -74,10 +74,10 @@ def _was_interrupted(error: BaseException | None) -> bool:
 def _check_numbers(options: Mapping[str, object]) -> None:
     """Raises `VoleryError` for an option whose number is not finite or out of range."""
     for name, value in options.items():
-        if isinstance(value, float) and value and not _SMALLEST <= abs(value) <= _LARGEST:
+        if isinstance(value, float) and value and not _MIN_OPTION <= abs(value) <= _MAX_OPTION:
             flag = name.replace("_", "-")
             raise VoleryError(
-                f"--{flag}: 0, or a number from {_SMALLEST:g} to {_LARGEST:g}, not {value:g}"
+                f"--{flag}: 0, or a number from {_MIN_OPTION:g} to {_MAX_OPTION:g}, not {value:g}"
             )
 
 

@@ -358,7 +358,7 @@ def launch(
         Path, typer.Argument(help="Launch profile, a .toml file with \\[\\[launch]].")
     ],
     via: Annotated[
-        str | None, typer.Option(help="Join the graph this way, see `volery node`.")
+        str | None, typer.Option(help="Join the graph by this connection, see `volery node`.")
     ] = None,
     trust: TrustOption = False,
     namespace: Annotated[

@@ -115,19 +115,19 @@ class _Desk:
             await asyncio.sleep(_OTHERS_S)
 
     def _do(self, line: str) -> None:
-        word = line.strip()
-        if not word:
+        command = line.strip()
+        if not command:
             return
-        if word == "help":
+        if command == "help":
             echo_lines(HELP)
-        elif word == "list":
+        elif command == "list":
             print_table(HEAD, self.ground.rows(steady_time_ns()), right=(4, 5, 6))
             if not self.ground.has_received:
                 echo_line("no message of a UAV received so far")
             sys.stdout.flush()
         else:
             try:
-                self._print(self.ground.command(word))
+                self._print(self.ground.command(command))
             except CommsError as error:
                 self._print(f"error: {error}")
 

@@ -87,10 +87,10 @@ def report_grades(options: GradeOptions, *, as_json: bool) -> None:
 
 
 def _print(assignment: Assignment, grades: Sequence[Grade]) -> None:
-    most = sum(assignment.points.values())
+    max_points = sum(assignment.points.values())
     width = max(len(grade.submission) for grade in grades)
     for graded in grades:
-        echo_line(f"{graded.submission:{width}}  {graded.total:g} of {most:g}")
+        echo_line(f"{graded.submission:{width}}  {graded.total:g} of {max_points:g}")
         for name, points in graded.points.items():
             if points < assignment.points[name]:
                 echo_line(f"{'':{width}}    {points:g} of {assignment.points[name]:g}  {name}")
@@ -116,9 +116,9 @@ def csv_of(assignment: Assignment, grades: Sequence[Grade]) -> str:
     for graded in grades:
         points = graded.points
         row = [f"{points[name]:g}" for name in names]
-        most = sum(assignment.points.values())
+        max_points = sum(assignment.points.values())
         problems = "; ".join(graded.problems)
-        cells = [graded.submission, f"{graded.total:g}", f"{most:g}", *row, problems]
+        cells = [graded.submission, f"{graded.total:g}", f"{max_points:g}", *row, problems]
         writer.writerow([_harmless(cell) for cell in cells])
     return text.getvalue()
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.connections import DEFAULT_VIA, WAYS
+from volery.cli.connections import CONNECTION_FORMS, DEFAULT_VIA
 from volery.cli.error_reporting import guarded
 from volery.cli.options import TracebackOption
 
@@ -17,11 +17,11 @@ service_app = typer.Typer(no_args_is_help=True, context_settings=_CONTEXT)
 
 Via = Annotated[
     str,
-    typer.Option(help=f"Join the graph by {WAYS}; default: VOLERY_VIA."),
+    typer.Option(help=f"Join the graph by {CONNECTION_FORMS}; default: VOLERY_VIA."),
 ]
 ViaOfAll = Annotated[
     str,
-    typer.Option("--via", envvar="VOLERY_VIA", help=f"Join the graph by {WAYS}."),
+    typer.Option("--via", envvar="VOLERY_VIA", help=f"Join the graph by {CONNECTION_FORMS}."),
 ]
 Topic = Annotated[str, typer.Argument(help="Name of a topic.")]
 Service = Annotated[str, typer.Argument(help="Name of a service.")]
@@ -52,7 +52,8 @@ def node(
     via: Annotated[
         str | None,
         typer.Option(
-            help=f"Join the graph by {WAYS}; default: the profile's, VOLERY_VIA, {DEFAULT_VIA}."
+            help=f"Join the graph by {CONNECTION_FORMS}; default: the profile's, VOLERY_VIA, "
+            f"{DEFAULT_VIA}."
         ),
     ] = None,
     namespace: Annotated[str | None, typer.Option(help="Set the namespace, such as /uav1.")] = None,

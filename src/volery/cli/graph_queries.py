@@ -11,18 +11,18 @@ from volery.graph.messages import message_type
 TIMEOUT_S = 10.0
 
 
-def ask_rosapi(link: GraphConnection, question: str, **fields: Any) -> Any:
-    """Calls a `/rosapi` service; `question` is its type, such as `TopicType`."""
-    request = message_type(f"rosapi_msgs/srv/{question}_Request")(**fields)
-    return call_and_wait(link, "/rosapi/" + _snake(question), request, TIMEOUT_S)
+def call_rosapi(link: GraphConnection, type_name: str, **fields: Any) -> Any:
+    """Calls a `/rosapi` service; `type_name` is its type, such as `TopicType`."""
+    request = message_type(f"rosapi_msgs/srv/{type_name}_Request")(**fields)
+    return call_and_wait(link, "/rosapi/" + _snake(type_name), request, TIMEOUT_S)
 
 
 def topic_types(link: GraphConnection) -> dict[str, str]:
     """Returns the topics of the graph and their types, by name."""
     if isinstance(link, ListsTopics):
         return dict(sorted(link.topic_types().items()))
-    answer = ask_rosapi(link, "Topics")
-    return dict(sorted(zip(answer.topics, answer.types, strict=True)))
+    response = call_rosapi(link, "Topics")
+    return dict(sorted(zip(response.topics, response.types, strict=True)))
 
 
 def type_of_topic(link: GraphConnection, topic: str) -> str:
@@ -30,7 +30,7 @@ def type_of_topic(link: GraphConnection, topic: str) -> str:
     if isinstance(link, ListsTopics):
         found = link.topic_types().get(topic, "")
     else:
-        found = ask_rosapi(link, "TopicType", topic=topic).type
+        found = call_rosapi(link, "TopicType", topic=topic).type
     if not found:
         raise BridgeError(f"there is no topic '{topic}'; see `volery topic list`")
     return found
@@ -40,7 +40,7 @@ def service_names(link: GraphConnection) -> list[str]:
     """Returns the services of the graph, sorted."""
     if isinstance(link, ListsServices):
         return sorted(link.service_types())
-    return sorted(ask_rosapi(link, "Services").services)
+    return sorted(call_rosapi(link, "Services").services)
 
 
 def type_of_service(link: GraphConnection, service: str) -> str:
@@ -48,7 +48,7 @@ def type_of_service(link: GraphConnection, service: str) -> str:
     if isinstance(link, ListsServices):
         found = link.service_types().get(service, "")
     else:
-        found = ask_rosapi(link, "ServiceType", service=service).type
+        found = call_rosapi(link, "ServiceType", service=service).type
     if not found:
         raise BridgeError(f"service '{service}' has no server; see `volery service list`")
     return found

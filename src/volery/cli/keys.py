@@ -60,9 +60,9 @@ class Keys:
     def _read_single_keys(self) -> None:
         """Turns line buffering and echo off, again if a shell has turned them on meanwhile."""
         mode: list[Any] = termios.tcgetattr(self._terminal)
-        taken_off = termios.ICANON | termios.ECHO
-        if mode[_LOCAL_FLAGS] & taken_off:
-            mode[_LOCAL_FLAGS] &= ~taken_off
+        cleared = termios.ICANON | termios.ECHO
+        if mode[_LOCAL_FLAGS] & cleared:
+            mode[_LOCAL_FLAGS] &= ~cleared
             mode[_CONTROL][termios.VMIN], mode[_CONTROL][termios.VTIME] = 1, 0
             termios.tcsetattr(self._terminal, termios.TCSADRAIN, mode)
 

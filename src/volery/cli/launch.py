@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from volery.cli.connections import DEFAULT_VIA, ConnectionOptions, await_link, join_late
+from volery.cli.connections import DEFAULT_VIA, ConnectionMonitor, await_link, join_late
 from volery.cli.terminal import echo_line
 from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import BridgeError
@@ -46,8 +46,8 @@ def launch_profile(
         access = replace(access, is_trusted=may_run_local_nodes(path, nodes, access))
     if namespace is not None:
         profile = profile.model_copy(update={"namespace": namespace})
-    way = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    with closing(DeferredConnection(profile.name, lambda: await_link(way, profile.name))) as late:
+    url = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
+    with closing(DeferredConnection(profile.name, lambda: await_link(url, profile.name))) as late:
         host = NodeHost(late, clock=profile.clock)
         started = start_profile(profile, host, access)
         try:
@@ -57,8 +57,8 @@ def launch_profile(
             for node in started:
                 host.announce(node.full_name)
             names = ", ".join(node.get_name() for node in started)
-            echo_line(f"{names} run on {way}; Ctrl-C ends them", err=True)
-            host.spin(ConnectionOptions(link, way))
+            echo_line(f"{names} run on {url}; Ctrl-C ends them", err=True)
+            host.spin(ConnectionMonitor(link, url))
         finally:
             for node in started:
                 node.destroy_node()

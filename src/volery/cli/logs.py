@@ -80,8 +80,8 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         made.unlink(missing_ok=True)
     if scans.left_out:
         warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.problem}")
-    for doubt in scans.doubts:
-        warn(f"{path}: {doubt}")
+    for warning in scans.warnings:
+        warn(f"{path}: {warning}")
     echo_line(
         f"{counted(scans.scans, 'scan')}, {counted(log.messages, 'message')} written to {out}"
     )

@@ -10,7 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from volery.cli.connections import DEFAULT_VIA, ROS2_WAYS, ConnectionOptions, await_link, join_late
+from volery.cli.connections import (
+    DEFAULT_VIA,
+    ROS2_SCHEMES,
+    ConnectionMonitor,
+    await_link,
+    join_late,
+)
 from volery.cli.error_reporting import warn
 from volery.cli.graph_queries import topic_types
 from volery.cli.terminal import echo_line
@@ -61,7 +67,7 @@ def run_node(options: NodeOptions) -> None:
         ) from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    if options.lock_step_s is not None and via.partition("://")[0] in ROS2_WAYS:
+    if options.lock_step_s is not None and via.partition("://")[0] in ROS2_SCHEMES:
         raise BridgeError("--lock-step: ROS 2 keeps no order between topics; use rosbridge")
     if options.lock_step_s is not None and not 0.0 < options.lock_step_s < math.inf:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
@@ -80,7 +86,7 @@ def run_node(options: NodeOptions) -> None:
             host.announce(node.full_name)
             echo_line(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
             _check_namespace(link, namespace)
-            host.spin(ConnectionOptions(link, via))
+            host.spin(ConnectionMonitor(link, via))
         finally:
             node.destroy_node()
 
@@ -100,8 +106,8 @@ def _check_namespace(link: GraphConnection, namespace: str) -> None:
 
 def _folder_of(name: str, profile: Path | None) -> Path:
     """Returns a folder relative to the profile, else relative to the working folder."""
-    beside = Path(name) if profile is None else profile.parent / name
-    return beside if beside.is_dir() else Path(name)
+    nested = Path(name) if profile is None else profile.parent / name
+    return nested if nested.is_dir() else Path(name)
 
 
 def _parameters(words: Sequence[str]) -> dict[str, Any]:

@@ -35,11 +35,11 @@ def check_folder(folder: Path, what: str) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise VoleryError(f"{folder} is not a folder")
-    place = folder.absolute()
-    while not place.exists():
-        place = place.parent
+    existing = folder.absolute()
+    while not existing.exists():
+        existing = existing.parent
     try:
-        with tempfile.TemporaryDirectory(prefix=".volery-", dir=place):
+        with tempfile.TemporaryDirectory(prefix=".volery-", dir=existing):
             return
     except OSError as error:
         raise VoleryError(f"{folder}: cannot write {what} there: {reason_of(error)}") from None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from volery.server.server_state import World
     from volery.server.settings import PageSettings
 
-AT_THE_USUAL_PLACE = ""
+DEFAULT_ADDRESS = ""
 """Value of `--page` without an address."""
 
 
@@ -57,12 +57,12 @@ def page_of(options: RunOptions) -> Iterator[Page]:
 
 
 @contextmanager
-def serving(settings: PageSettings, shelf: ScenarioCatalog | None = None) -> Iterator[Page]:
+def serving(settings: PageSettings, catalog: ScenarioCatalog | None = None) -> Iterator[Page]:
     """Serves the page, with cards of the catalog's scenarios, and prints its address."""
     from volery.server.page import is_built
     from volery.server.page_server import PageServer
 
-    with PageServer(settings, shelf) as server:
+    with PageServer(settings, catalog) as server:
         needed = "  (needs the token)" if settings.tokens.needed else ""
         echo_line(f"page    {server.url}{needed}", err=True)
         if not is_built():
@@ -80,7 +80,7 @@ def _settings_of(options: RunOptions) -> PageSettings:
         origins=options.origins,
         recordings=options.recordings,
     )
-    if options.page == AT_THE_USUAL_PLACE:
+    if options.page == DEFAULT_ADDRESS:
         return replace(settings, port=usual_port(settings.host))
     host, colon, port = (options.page or "").rpartition(":")
     if not port.isdecimal() or not 0 <= int(port) <= 65535 or (colon and not host):

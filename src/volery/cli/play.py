@@ -70,11 +70,11 @@ def play(
 
 
 def _introduce(player: LogPlayer) -> None:
-    told = player.describe()
-    what = f", a flight of '{told['scenario']}'" if told["scenario"] else ""
+    log = player.describe()
+    origin = f", a flight of '{log['scenario']}'" if log["scenario"] else ""
     span = f"{player.start_s:.3f} to {player.end_s:.3f} s"
-    messages = counted(sum(told["counts"]), "message")
-    echo_line(f"playing {player.path} ({span}, {messages}{what})", err=True)
-    if told["problem"]:
+    messages = counted(sum(log["counts"]), "message")
+    echo_line(f"playing {player.path} ({span}, {messages}{origin})", err=True)
+    if log["problem"]:
         mend = f"`volery recover {player.path}` writes what is readable"
-        echo_line(f"        {told['problem']}; {mend}", err=True)
+        echo_line(f"        {log['problem']}; {mend}", err=True)

@@ -76,7 +76,7 @@ def parameters_for(airframe: Airframe) -> Mapping[str, float]:
     speeds = np.sqrt(hover_thrusts(airframe) / rotors.thrust_n_s2)
     return px4_parameters(
         Px4Airframe(
-            [Px4Rotor(place.position_m, place.axis, place.direction) for place in rotors.places],
+            [Px4Rotor(rotor.position_m, rotor.axis, rotor.direction) for rotor in rotors.places],
             rotors.torque_m,
             float(speeds.mean()) / rotors.max_speed_rad_s,
             airframe.limits.tilt_deg,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from volery.cli.error_reporting import warn
 
 _NOTABLE_MB_PER_MIN = 100.0
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 
 
 def warn_of_size(rates: Mapping[str, float], matches: Callable[[str], bool]) -> None:
@@ -19,7 +19,7 @@ def warn_of_size(rates: Mapping[str, float], matches: Callable[[str], bool]) -> 
     total = sum(recorded.values())
     if total < _NOTABLE_MB_PER_MIN:
         return
-    largest = sorted(recorded, key=lambda topic: -recorded[topic])[:_MOST_NAMED]
+    largest = sorted(recorded, key=lambda topic: -recorded[topic])[:_MAX_NAMED]
     named = ", ".join(f"{topic} {recorded[topic]:.0f}" for topic in largest)
     warn(
         f"the log grows by about {total:.0f} MB per minute of the flight, from images alone "

@@ -33,7 +33,7 @@ __all__ = ["RunOptions", "fly", "parse_speed"]
 _THREADS = 2
 _GLANCE_S = 0.2
 """Wall time between two checks for Ctrl-C in a run without a world, s."""
-_FAREWELL_S = 0.1
+_LAST_RESPONSE_S = 0.1
 """Wall time for the last response to arrive at its client, s."""
 
 
@@ -59,11 +59,11 @@ def fly(options: RunOptions) -> int:
     with page_of(options) as page, Interrupts() as interrupts:
         try:
             code, change = _build_and_fly(options, interrupts, page)
-            while change.asked and not code:
-                if change.wanted is None:
+            while change.is_requested and not code:
+                if change.request is None:
                     code, change = _wait_for_world(options, interrupts, page)
                 else:
-                    options = _loading(options, change.wanted)
+                    options = _loading(options, change.request)
                     code, change = _build_and_fly(options, interrupts, page)
         except KeyboardInterrupt:
             if interrupts.gentle:
@@ -96,7 +96,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
             scenario,
             threads=threads,
             recordings=options.recordings,
-            on_load=change.ask,
+            on_load=change.request_world,
             **partition,
         )
         change.quit = simulation.clock.quit
@@ -122,12 +122,12 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
     from volery.runtime.idle_server import IdleServer
 
     change = _Change(options)
-    idle = IdleServer(change.ask)
+    idle = IdleServer(change.request_world)
     echo_line("no world is loaded; load one with /load_world; Ctrl-C exits", err=True)
     with open_bridges(idle.gateway, options), page.showing(idle):
-        while not (change.asked or idle.quitting or interrupts.pressed):
+        while not (change.is_requested or idle.quitting or interrupts.pressed):
             idle.wait(_GLANCE_S)
-        idle.wait(_FAREWELL_S)
+        idle.wait(_LAST_RESPONSE_S)
     return stopped_code() if interrupts.pressed else 0, change
 
 
@@ -149,12 +149,12 @@ def _scenario_of(options: RunOptions) -> Scenario:
 
 def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:
     """Returns the options of the flight that a client requests."""
-    wanted = request.changes
-    if wanted.speed is not None:
-        options = replace(options, speed=wanted.speed or None)
-    if wanted.uavs is not None:
+    requested = request.changes
+    if requested.speed is not None:
+        options = replace(options, speed=requested.speed or None)
+    if requested.uavs is not None:
         options = replace(options, uavs=None)
-    return replace(options, scenario=request.name, changes=wanted)
+    return replace(options, scenario=request.name, changes=requested)
 
 
 class _Change:
@@ -162,12 +162,12 @@ class _Change:
 
     def __init__(self, options: RunOptions) -> None:
         self._options = options
-        self.asked = False
-        self.wanted: WorldRequest | None = None
+        self.is_requested = False
+        self.request: WorldRequest | None = None
         """None: no world."""
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, request: WorldRequest | LogRequest | None) -> None:
+    def request_world(self, request: WorldRequest | LogRequest | None) -> None:
         """Ends the current flight for another one.
 
         Raises `CommandError` if the flight must not end.
@@ -186,7 +186,7 @@ class _Change:
             raise CommandError("this run simulates; `volery serve` and `volery play` play logs")
         if request is not None:
             _scenario_of(_loading(options, request))
-        self.asked, self.wanted = True, request
+        self.is_requested, self.request = True, request
         self.quit()
 
 

@@ -187,7 +187,7 @@ class _Test:
         self._folder = options.out / self._loaded.study.name
 
     def fly(self) -> TestedScenario:
-        """Flies all seeds anew."""
+        """Flies all seeds again."""
         start = time.monotonic()
         seeds = self._options.seeds or 1
         with StudyProgress(self._path, err=True) as progress:

@@ -38,7 +38,7 @@ _THREADS = 2
 _LOG_SUFFIXES = (".mcap", ".bag", ".db3")
 _GLANCE_S = 0.02
 """Wall seconds between looks at clients of a paused world, and at Ctrl-C without a world."""
-_FAREWELL_S = 0.1
+_LAST_RESPONSE_S = 0.1
 """Wall time for the last response to arrive at its client, s."""
 
 
@@ -68,70 +68,72 @@ def serve(options: ServeOptions) -> None:
         warn(gap)
     log = _log_of(options.first.scenario)
     first = None if log is not None else _first_scenario(with_trust(options.first))
-    shelf = ScenarioCatalog(options.page.uploads, options.page.recordings, given=first)
+    catalog = ScenarioCatalog(options.page.uploads, options.page.recordings, given=first)
     return_large_blocks()
-    with Interrupts() as interrupts, serving(options.page, shelf) as page:
-        host = _Host(options, page, interrupts, _Wish(log or first, options.first.speed, shelf))
+    with Interrupts() as interrupts, serving(options.page, catalog) as page:
+        host = _Host(
+            options, page, interrupts, _NextRun(log or first, options.first.speed, catalog)
+        )
         while host.goes_on:
             host.go_on()
     echo_line("the server has stopped", err=True)
 
 
-class _Wish:
+class _NextRun:
     """Holds what runs next: the first scenario or log, then what clients request."""
 
     def __init__(
-        self, first: Scenario | Path | None, speed: float | None, shelf: ScenarioCatalog
+        self, first: Scenario | Path | None, speed: float | None, catalog: ScenarioCatalog
     ) -> None:
-        self.shelf = shelf
+        self.catalog = catalog
         """Scenarios that may run."""
         self.speed = speed
         """Initial real-time factor; None: as fast as possible."""
-        self.asked = True
-        self._wanted = first
+        self.is_requested = True
+        self._choice = first
         self.quit: Callable[[], None] = _nothing
 
-    def ask(self, request: WorldRequest | LogRequest | None) -> None:
+    def request(self, request: WorldRequest | LogRequest | None) -> None:
         """Ends the current flight for another one.
 
         Raises `VoleryError` if the request cannot be met.
         """
         if request is None:
-            self.want(None)
+            self.choose(None)
         elif isinstance(request, LogRequest):
-            self.want(request.path)
+            self.choose(request.path)
         else:
-            self.want(changes.apply(self.shelf.load(request.name), request.changes))
+            self.choose(changes.apply(self.catalog.load(request.name), request.changes))
             speed = request.changes.speed
             self.speed = self.speed if speed is None else speed or None
         self.quit()
 
-    def want(self, what: Scenario | Path | None) -> None:
+    def choose(self, what: Scenario | Path | None) -> None:
         """Sets the scenario to fly or the log to play next; None: no world."""
-        self.asked, self._wanted = True, what
+        self.is_requested, self._choice = True, what
 
     def take(self) -> Scenario | Path | None:
         """Returns the current request; later requests come after it."""
-        self.asked, self.quit = False, _nothing
-        return self._wanted
+        self.is_requested, self.quit = False, _nothing
+        return self._choice
 
 
 class _Host:
     """Builds worlds and runs them, one at a time."""
 
     def __init__(
-        self, options: ServeOptions, page: Page, interrupts: Interrupts, wish: _Wish
+        self, options: ServeOptions, page: Page, interrupts: Interrupts, next_run: _NextRun
     ) -> None:
         self._options = options
         self._page = page
         self._interrupts = interrupts
-        self._wish = wish
+        self._next_run = next_run
         self._present: Scenario | None = None
         """World that was built last."""
         self._problem = ""
         """Last problem, for the page."""
         self._quits = False
-        self._is_unasked = options.page.unasked
+        self._is_default = options.page.unasked
         """Whether no client has chosen the world that is built next."""
         self._first_flight: FirstFlight | None = None
         self._verdicts: LiveVerdicts | None = None
@@ -144,22 +146,22 @@ class _Host:
 
     def go_on(self) -> None:
         """Runs the request until another one arrives; after a failure returns to the last world."""
-        wanted = self._wish.take()
-        if wanted is None:
+        choice = self._next_run.take()
+        if choice is None:
             self._wait()
             return
         try:
-            if isinstance(wanted, Path):
-                self._play(wanted)
+            if isinstance(choice, Path):
+                self._play(choice)
             else:
-                self._fly(wanted)
+                self._fly(choice)
         except Exception as error:  # an error of ours in one world must not end the others
             if self._present is None:
                 raise
             what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
-            self._problem = named_problem(wanted.name, what)
+            self._problem = named_problem(choice.name, what)
             complain_of(error, self._problem)
-            self._wish.want(None if self._present is wanted else self._present)
+            self._next_run.choose(None if self._present is choice else self._present)
 
     def _fly(self, scenario: Scenario) -> None:
         """Builds a world and runs it."""
@@ -172,53 +174,58 @@ class _Host:
             fit_out(scenario, first),
             threads=threads,
             recordings=first.recordings,
-            on_load=self._wish.ask,
-            shelf=self._wish.shelf,
+            on_load=self._next_run.request,
+            shelf=self._next_run.catalog,
         ) as simulation:
-            self._present, self._wish.quit = scenario, simulation.clock.quit
+            self._present, self._next_run.quit = scenario, simulation.clock.quit
             self._interrupts.be_gentle()
             shown = page.showing(simulation, self._problem)
             bridges = open_bridges(simulation.gateway, first, simulation.uavs)
             with spared_objects(), bridges, shown:
                 self._problem = ""
                 echo_line(f"flying  {scenario.name}", err=True)
-                self._first_flight = FirstFlight(simulation) if self._is_unasked else None
-                self._is_unasked = False
+                self._first_flight = FirstFlight(simulation) if self._is_default else None
+                self._is_default = False
                 self._verdicts = _verdicts_of(simulation)
                 self._stay(simulation)
                 self._first_flight = None
-            self._quits = simulation.clock.quitting and not self._wish.asked
+            self._quits = simulation.clock.quitting and not self._next_run.is_requested
 
     def _play(self, log: Path) -> None:
         """Opens a log and plays it."""
         from volery.runtime.replay.log_player import LogPlayer
 
         with LogPlayer(
-            log, on_load=self._wish.ask, on_close=self._return, shelf=self._wish.shelf
+            log,
+            on_load=self._next_run.request,
+            on_close=self._return,
+            catalog=self._next_run.catalog,
         ) as player:
             if player.scenario is not None:
                 self._page.building(player.scenario, self._problem)
             _ = player.geometry  # computed here: the server only reads it
-            self._wish.quit = player.quit
+            self._next_run.quit = player.quit
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
             shown = page.showing(player, self._problem, player.name)
             with spared_objects(), open_bridges(player.gateway, first), shown:
                 self._problem = ""
                 echo_line(f"playing {log.name}", err=True)
-                while not (self._wish.asked or player.quitting or self._interrupts.pressed):
+                while not (
+                    self._next_run.is_requested or player.quitting or self._interrupts.pressed
+                ):
                     player.wait(_GLANCE_S)
-                player.wait(_FAREWELL_S)
-            self._quits = player.quitting and not self._wish.asked
+                player.wait(_LAST_RESPONSE_S)
+            self._quits = player.quitting and not self._next_run.is_requested
 
     def _return(self) -> None:
         """Requests the scenario that ran before a log."""
-        self._wish.want(self._present)
-        self._wish.quit()
+        self._next_run.choose(self._present)
+        self._next_run.quit()
 
     def _stay(self, simulation: Simulation) -> None:
         """Runs the scenario; at its end stays paused until a reset or another request."""
-        speed = self._wish.speed
+        speed = self._next_run.speed
         try:
             while not simulation.clock.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
@@ -228,7 +235,7 @@ class _Host:
                 speed = simulation.clock.speed  # also where it was set at the end
         except _StoppedError:
             return
-        time.sleep(_FAREWELL_S)
+        time.sleep(_LAST_RESPONSE_S)
 
     def _look(self, _progress: Any = None) -> None:
         if self._interrupts.pressed:
@@ -242,14 +249,14 @@ class _Host:
         """Runs the bridges without a world."""
         from volery.runtime.idle_server import IdleServer
 
-        idle = IdleServer(self._wish.ask, self._wish.shelf)
+        idle = IdleServer(self._next_run.request, self._next_run.catalog)
         bridges = open_bridges(idle.gateway, self._options.first)
         with bridges, self._page.showing(idle, self._problem):
             echo_line("no world is loaded", err=True)
             self._problem = ""
-            while not (self._wish.asked or idle.quitting or self._interrupts.pressed):
+            while not (self._next_run.is_requested or idle.quitting or self._interrupts.pressed):
                 idle.wait(_GLANCE_S)
-            idle.wait(_FAREWELL_S)
+            idle.wait(_LAST_RESPONSE_S)
         self._quits = idle.quitting
 
 

@@ -26,7 +26,7 @@ _MAPS = ("map.png", "map.pgm", "map.yaml")
 _NAMES = (*_MAPS, "path.tum", "summary.json")
 _PLAIN_PERIOD_S = 10.0
 """Time between lines of progress if stderr is no terminal."""
-_WAYS_TIMES, _WAYS_APART_M = 5.0, 5.0
+_MAX_RATIO, _MIN_DIFFERENCE_M = 5.0, 5.0
 """Paths by odometry and by scans that differ by more than this factor and distance are
 inconsistent."""
 _DEGRADED = 0.1
@@ -50,12 +50,12 @@ class SlamArguments:
     level_mount: str | None
     nodding_mount: str | None
     resolution: float
-    reach: float
+    max_range: float
     loops: bool
     overwrite: bool
 
 
-def map_log(asked: SlamArguments) -> None:
+def map_log(args: SlamArguments) -> None:
     """Runs the SLAM over a log, writes its results and prints a summary."""
     from volery.bridges.logs.text_layout import TextLayout
     from volery.runtime.replay.slam.offline_slam import SlamOptions
@@ -63,35 +63,35 @@ def map_log(asked: SlamArguments) -> None:
     from volery.runtime.replay.slam.topic_selection import RequestedTopics, other_uavs
     from volery.scenario.data_files import load_data_file
 
-    _check_folder(asked.out, overwrite=asked.overwrite)
-    layout = None if asked.layout is None else load_data_file(asked.layout, TextLayout)
-    source = open_source(asked.log, layout)
+    _check_folder(args.out, overwrite=args.overwrite)
+    layout = None if args.layout is None else load_data_file(args.layout, TextLayout)
+    source = open_source(args.log, layout)
     topics = RequestedTopics(
-        asked.uav, asked.scan, asked.odometry, asked.imu_topic, asked.has_odometry, asked.has_imu
+        args.uav, args.scan, args.odometry, args.imu_topic, args.has_odometry, args.has_imu
     )
-    start = _numbers(asked.start, 4, "--initial-pose")
+    start = _numbers(args.start, 4, "--initial-pose")
     options = SlamOptions(
         topics,
         None if start is None else (*start[:3], math.radians(start[3])),
-        _numbers(asked.level_mount, 3, "--level-mount"),
-        _numbers(asked.nodding_mount, 3, "--nodding-mount"),
-        asked.reach,
-        asked.loops,
+        _numbers(args.level_mount, 3, "--level-mount"),
+        _numbers(args.nodding_mount, 3, "--nodding-mount"),
+        args.max_range,
+        args.loops,
     )
     run = _run(source, options)
     others = other_uavs(source.topics, run.channels.uav)
-    echo_line(f"mapping {asked.log}{_beginning(run.start, start)}", err=True)
-    if others and asked.uav is None and asked.scan is None:
+    echo_line(f"mapping {args.log}{_beginning(run.start, start)}", err=True)
+    if others and args.uav is None and args.scan is None:
         warn(f"mapping {run.channels.uav}; the log also has {', '.join(others)}: select with --uav")
     try:
         outcome = run.run(_Progress().show)
     finally:  # a problem of the log often explains why the SLAM failed
-        for problem in filter(None, (source.problem, *source.doubts)):
-            warn(f"{asked.log}: {problem}")
-    cell_m = _write(asked, outcome)
-    _print_summary(asked.out, _summary(asked, outcome, source.refused, cell_m, run.start))
+        for problem in filter(None, (source.problem, *source.warnings)):
+            warn(f"{args.log}: {problem}")
+    cell_m = _write(args, outcome)
+    _print_summary(args.out, _summary(args, outcome, source.refused, cell_m, run.start))
     _advise(outcome, source.topics)
-    _compare_ways(outcome)
+    _compare_path_lengths(outcome)
 
 
 def _run(source: LogSource | TextSource, options: SlamOptions) -> OfflineSlam:
@@ -106,9 +106,9 @@ def _run(source: LogSource | TextSource, options: SlamOptions) -> OfflineSlam:
         raise RecordingError(f"{error}; the log is {source.damage}") from None
 
 
-def _beginning(start: Pose | None, asked: Pose | None) -> str:
+def _beginning(start: Pose | None, start_option: Pose | None) -> str:
     """Returns the initial pose as text if the log defines one."""
-    if start is None or asked is not None:
+    if start is None or start_option is not None:
         return ""
     x, y, z, yaw = _in_degrees(start)
     return (
@@ -150,12 +150,12 @@ def _advise(outcome: SlamResult, topics: dict[str, str]) -> None:
         )
 
 
-def _compare_ways(outcome: SlamResult) -> None:
+def _compare_path_lengths(outcome: SlamResult) -> None:
     """Warns if the path lengths by odometry and by scans contradict each other."""
     wheels, seen = outcome.wheels_m, outcome.trajectory.length_m
-    if wheels is None or abs(wheels - seen) < _WAYS_APART_M:
+    if wheels is None or abs(wheels - seen) < _MIN_DIFFERENCE_M:
         return
-    if max(wheels, seen) > _WAYS_TIMES * min(wheels, seen):
+    if max(wheels, seen) > _MAX_RATIO * min(wheels, seen):
         warn(
             f"the path is {wheels:.1f} m long by odometry, by scans "
             f"{seen:.1f} m: check the units, or use --no-odometry"
@@ -182,42 +182,42 @@ def _numbers(text: str | None, count: int, option: str) -> Any:
     return found
 
 
-def _write(asked: SlamArguments, outcome: SlamResult) -> float | None:
+def _write(args: SlamArguments, outcome: SlamResult) -> float | None:
     """Writes the path, and the map if there is one; returns the width of its cells, m."""
     from volery.runtime.replay.slam.trajectory import write_tum
 
-    asked.out.mkdir(parents=True, exist_ok=True)
+    args.out.mkdir(parents=True, exist_ok=True)
     for name in _MAPS:
-        (asked.out / name).unlink(missing_ok=True)
-    write_tum(asked.out / "path.tum", outcome.trajectory)
+        (args.out / name).unlink(missing_ok=True)
+    write_tum(args.out / "path.tum", outcome.trajectory)
     try:
-        return _write_map(asked, outcome)
+        return _write_map(args, outcome)
     except RecordingError as error:
         warn(f"no map is written: {error}")
         return None
 
 
-def _write_map(asked: SlamArguments, outcome: SlamResult) -> float:
+def _write_map(args: SlamArguments, outcome: SlamResult) -> float:
     from volery.autonomy.mapping.grid_files import write_grid
     from volery.runtime.replay.slam.map_image import write_image
     from volery.runtime.replay.slam.map_rendering import draw_map
 
-    grid = draw_map(outcome, asked.resolution, asked.reach)
-    if grid.cell_m > asked.resolution:
+    grid = draw_map(outcome, args.resolution, args.max_range)
+    if grid.cell_m > args.resolution:
         rows, columns = grid.odds.shape
         warn(
             f"the map is {columns * grid.cell_m:.0f} m x {rows * grid.cell_m:.0f} m, too large for "
-            f"cells of {asked.resolution:g} m: cells are {grid.cell_m:g} m wide"
+            f"cells of {args.resolution:g} m: cells are {grid.cell_m:g} m wide"
         )
     values = grid.occupancy()
-    write_grid(asked.out / "map", values, grid.origin, grid.cell_m)
-    way = outcome.trajectory.position[:, :2]
-    write_image(asked.out / "map.png", values, grid.origin, grid.cell_m, way)
+    write_grid(args.out / "map", values, grid.origin, grid.cell_m)
+    positions = outcome.trajectory.position[:, :2]
+    write_image(args.out / "map.png", values, grid.origin, grid.cell_m, positions)
     return grid.cell_m
 
 
 def _summary(
-    asked: SlamArguments,
+    args: SlamArguments,
     outcome: SlamResult,
     refused: int,
     cell_m: float | None,
@@ -225,7 +225,7 @@ def _summary(
 ) -> dict[str, Any]:
     status = outcome.status
     results = {
-        "log": asked.log.name,
+        "log": args.log.name,
         "uav": outcome.channels.uav,
         "mode": "imu" if outcome.channels.has_imu else "planar",
         "topics": outcome.channels.names,
@@ -247,9 +247,9 @@ def _summary(
     }
     try:
         text = json.dumps(results, indent=2) + "\n"
-        write_whole(asked.out / "summary.json", text)
+        write_whole(args.out / "summary.json", text)
     except OSError as error:
-        raise RecordingError(f"{asked.out}: {error.strerror}") from None
+        raise RecordingError(f"{args.out}: {error.strerror}") from None
     return results
 
 

@@ -50,7 +50,7 @@ class StudyProgress:
             self._live.update(_panel(self._name, progress))
         elif time.monotonic() - self._shown_at > _PLAIN_PERIOD_S:
             self._shown_at = time.monotonic()
-            echo_line(f"{self._name}: {_words(progress)}", err=self._err)
+            echo_line(f"{self._name}: {_summary(progress)}", err=self._err)
 
     def stop(self) -> None:
         """Removes the display; later output is printed below it."""
@@ -59,7 +59,7 @@ class StudyProgress:
             self._live = None
 
 
-def _words(progress: SweepProgress) -> str:
+def _summary(progress: SweepProgress) -> str:
     rate = progress.flown / progress.elapsed_s if progress.elapsed_s > 0.0 else 0.0
     return (
         f"{progress.done:,} of {progress.total:,} runs, {progress.failed:,} failed, "
@@ -86,7 +86,7 @@ def _panel(name: str, progress: SweepProgress) -> Any:
     head.add_column(ratio=1)
     head.add_column(justify="right", no_wrap=True)
     bar = ProgressBar(total=max(progress.total, 1), completed=progress.done)
-    head.add_row(Text(name, style="bold"), bar, _words(progress))
+    head.add_row(Text(name, style="bold"), bar, _summary(progress))
     workers = Table.grid(padding=(0, 2))
     for worker in progress.workers[:_WORKERS_SHOWN]:
         present = f"flies {worker.batch:,}" if worker.state == "busy" else worker.state

@@ -90,19 +90,19 @@ def print_scenario(tested: TestedScenario) -> None:
 def print_summary(all_tested: Sequence[TestedScenario], seconds: float) -> None:
     """Prints how many flights failed, and the least margin of each expectation."""
     for tested in all_tested:
-        margins = _least_margins(tested)
+        margins = _min_margins(tested)
         if margins:
             echo_line(f"least margins of {tested.path}")
         for name, (margin, unit, seed) in margins.items():
             echo_line(f"  {margin:9.3g} {unit:4} {name} (seed {seed})")
     flights = sum(len(tested.flights) for tested in all_tested)
     failed = sum(len(tested.failed) for tested in all_tested)
-    word = (
+    outcome = (
         f"{failed} of {counted(flights, 'flight')} failed"
         if failed
         else (f"{counted(flights, 'flight')} passed")
     )
-    echo_line(f"{word} in {seconds:.1f} s")
+    echo_line(f"{outcome} in {seconds:.1f} s")
 
 
 def json_of(all_tested: Sequence[TestedScenario]) -> str:
@@ -173,7 +173,7 @@ def _print_failure(path: str, flight: TestedFlight) -> None:
 
 def _hints(flight: TestedFlight) -> list[str]:
     found = {"replay": flight.replay, "log": flight.log, "image": flight.image}
-    return [f"{word:7} {what}" for word, what in found.items() if what]
+    return [f"{label:7} {value}" for label, value in found.items() if value]
 
 
 def _ended(flight: TestedFlight) -> Verdict:
@@ -188,14 +188,14 @@ def _outcome(flight: TestedFlight) -> Outcome:
     return Outcome.FAILED if Outcome.FAILED in found else Outcome.PASSED
 
 
-def _least_margins(tested: TestedScenario) -> dict[str, tuple[float, str, int]]:
-    least: dict[str, tuple[float, str, int]] = {}
+def _min_margins(tested: TestedScenario) -> dict[str, tuple[float, str, int]]:
+    smallest: dict[str, tuple[float, str, int]] = {}
     for flight in tested.flights:
         for verdict in flight.verdicts:
-            known = least.get(verdict.name, (math.inf, "", 0))
+            known = smallest.get(verdict.name, (math.inf, "", 0))
             if verdict.margin < known[0]:
-                least[verdict.name] = (verdict.margin, verdict.unit, flight.seed)
-    return least
+                smallest[verdict.name] = (verdict.margin, verdict.unit, flight.seed)
+    return smallest
 
 
 def _plain(flight: TestedFlight) -> dict[str, Any]:

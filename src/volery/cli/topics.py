@@ -10,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 
-from volery.cli.connections import ConnectionOptions, open_link
+from volery.cli.connections import ConnectionMonitor, open_link
 from volery.cli.graph_queries import topic_types, type_of_topic
 from volery.cli.terminal import echo_line, echo_lines
 from volery.cli.yaml_codec import read_message, to_yaml
@@ -60,17 +60,17 @@ def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
 class Window:
     """Arrivals of the last messages: wall times (s) and sizes (bytes)."""
 
-    most: int
+    max_messages: int
     times: list[float] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
     is_fresh: bool = False
     """Whether a message has arrived since `take_line`."""
 
     def add(self, time_s: float, size: int) -> None:
-        """Adds a message; removes the oldest beyond `most`."""
+        """Adds a message; removes the oldest beyond `max_messages`."""
         self.times.append(time_s)
         self.sizes.append(size)
-        del self.times[: -self.most], self.sizes[: -self.most]
+        del self.times[: -self.max_messages], self.sizes[: -self.max_messages]
         self.is_fresh = True
 
     def take_line(self, line: Callable[[Window], str]) -> str:
@@ -106,14 +106,14 @@ class Window:
 def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str]) -> None:
     """Prints a line about a topic's arrivals each second."""
     seen = Window(window)
-    told = time.monotonic()
+    last_line_s = time.monotonic()
     sizes = line is Window.bandwidth_line
     for published in _messages(via, topic, "volery_topic_measure"):
         now = time.monotonic()
         if published is not None:
             seen.add(now, len(published.cdr) if sizes else 0)
-        if now - told >= 1.0:
-            told = now
+        if now - last_line_s >= 1.0:
+            last_line_s = now
             echo_lines(seen.take_line(line))
 
 
@@ -197,12 +197,12 @@ def _repeat(
 def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
     """Yields the messages of a topic without end, and None at least five times a second."""
     with closing(open_link(via, name)) as link:
-        come, told = threading.Event(), ConnectionOptions(link, via)
+        come, check_connection = threading.Event(), ConnectionMonitor(link, via)
         queue = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
         while True:
             come.wait(0.2)
             come.clear()
-            told()
+            check_connection()
             yield from queue.take()
             yield None
 

@@ -36,9 +36,9 @@ def train_and_write(
     task = find_task(name)
     if resume:
         folder = last_folder(task.name, out)
-        kept = read_checkpoint(folder.checkpoint)
-        check_task(kept, task.name, folder.checkpoint)
-        configuration = TrainingConfiguration.model_validate(kept.configuration)
+        checkpoint = read_checkpoint(folder.checkpoint)
+        check_task(checkpoint, task.name, folder.checkpoint)
+        configuration = TrainingConfiguration.model_validate(checkpoint.configuration)
     else:
         folder = new_folder(task.name, out)
         configuration = load_configuration(task.name, config)

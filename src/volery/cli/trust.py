@@ -85,15 +85,15 @@ def may_run_local_code(file: Path, modules: list[str]) -> bool:
     if not modules:
         return False
     if not set(modules) <= _trusted(file):
-        words = ", ".join(modules)
+        names = ", ".join(modules)
         if not at_terminal():
             raise ScenarioError(
-                f"{file}: runs code of its own ({words}); give --trust if it is yours"
+                f"{file}: runs code of its own ({names}); give --trust if it is yours"
             )
-        echo_line(f"{file} runs code of its own: {words}.", err=True)
+        echo_line(f"{file} runs code of its own: {names}.", err=True)
         echo_line("It can do whatever you can. Answer yes only if you know the code.", err=True)
         if not typer.confirm("Trust it from now on?", default=False, err=True):
-            raise ScenarioError(f"{file}: its own code ({words}) is not trusted")
+            raise ScenarioError(f"{file}: its own code ({names}) is not trusted")
         _remember(file, modules)
     return True
 

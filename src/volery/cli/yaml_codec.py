@@ -10,7 +10,7 @@ from typing import Any
 
 from volery.core.errors import GraphError
 
-_LONGEST_LIST = 128
+_MAX_LIST_LENGTH = 128
 
 
 def to_yaml(message: Any, *, whole: bool = False) -> str:
@@ -18,8 +18,10 @@ def to_yaml(message: Any, *, whole: bool = False) -> str:
     from volery.cli.yaml_writer import Numbers, write_yaml
     from volery.graph.codecs.json_codec import JsonCodec
 
-    most = sys.maxsize if whole else _LONGEST_LIST
-    form = JsonCodec(non_finite_as_null=False, arrays=lambda values, _kind: Numbers(values, most))
+    max_length = sys.maxsize if whole else _MAX_LIST_LENGTH
+    form = JsonCodec(
+        non_finite_as_null=False, arrays=lambda values, _kind: Numbers(values, max_length)
+    )
     return write_yaml(form.encode(message, message.__msgtype__))
 
 

@@ -22,13 +22,13 @@ _EXPONENT_WITHOUT_POINT = re.compile(r"(?<![.\d])(\d+)e")
 
 
 class Numbers:
-    """Array of numbers, shape (n,); its text shows the first `most`."""
+    """Array of numbers, shape (n,); its text shows the first `max_length`."""
 
-    def __init__(self, values: NDArray[Any], most: int) -> None:
-        text = ", ".join(map(repr, values[:most].tolist()))
+    def __init__(self, values: NDArray[Any], max_length: int) -> None:
+        text = ", ".join(map(repr, values[:max_length].tolist()))
         text = _EXPONENT_WITHOUT_POINT.sub(r"\1.0e", text)
         text = text.replace("inf", ".inf").replace("nan", ".nan")
-        left_out = len(values) - most
+        left_out = len(values) - max_length
         self.text = f"[{text}, ... {left_out} more]" if left_out > 0 else f"[{text}]"
 
 

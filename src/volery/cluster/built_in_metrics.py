@@ -16,7 +16,7 @@ from volery.verdicts.observing import Estimate, Estimates
 from volery.verdicts.verdict import Verdict
 
 _WH_POINTS = 201
-_LEAST_POSES = 3
+_MIN_POSES = 3
 
 
 def success(flight: FlightResult) -> float:
@@ -95,7 +95,7 @@ def ate_m(flight: FlightResult, estimates: Estimates) -> float:
 
 def _ate(flight: FlightResult, name: str, estimate: Estimate) -> float:
     inside = common_times(estimate.times_s, flight.times_s)
-    if inside.sum() < _LEAST_POSES:
+    if inside.sum() < _MIN_POSES:
         return np.nan
     truth = at_times(flight.times_s, flight[name].position_map, estimate.times_s[inside])
     return ate_rmse_m(estimate.position[inside], truth)

@@ -1,7 +1,7 @@
 """Searches the variations of a scenario for a flight that fails, and simplifies what it finds.
 
-A sampler proposes values, flights rate them by their least margin, and the search ends at the first
-flight that fails. The same seed and number of workers give the same search.
+A sampler proposes values, flights rate them by their smallest margin, and the search ends at the
+first flight that fails. The same seed and number of workers give the same search.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from volery.verdicts.verdict import Verdict
 _COLLECT_S = 0.5
 _HALVINGS = 6
 """Bisections of a value when a failure is simplified: to 1/64 of its range."""
-_LEAST_SCALE = 1e-6
+_MIN_SCALE = 1e-6
 
 
 class Sampler(Protocol):
@@ -206,12 +206,10 @@ class FailureSearch:
                 results[run.id] = failure_of(run, f"its worker {found.reason}")
 
     def _rating(self, result: RunResult) -> float:
-        """Returns the least margin, each in parts of that of the first flight."""
+        """Returns the smallest margin, each in parts of that of the first flight."""
         found = []
         for verdict in map(Verdict.from_data, result.verdicts):
             if math.isfinite(verdict.margin):
-                scale = self._scales.setdefault(
-                    verdict.name, max(_LEAST_SCALE, abs(verdict.margin))
-                )
+                scale = self._scales.setdefault(verdict.name, max(_MIN_SCALE, abs(verdict.margin)))
                 found.append(verdict.margin / scale)
         return min(found, default=0.0)

@@ -119,7 +119,11 @@ def _holder(path: Path) -> dict[str, Any]:
 
 
 def _held(folder: Path, holder: dict[str, Any]) -> str:
-    who = ""
+    owner = ""
     if holder:
-        who = f": process {holder.get('pid')} on {holder.get('host')}, since {holder.get('since')}"
-    return f"{folder}: another driver writes results here{who}; wait for it, or name another --out"
+        owner = (
+            f": process {holder.get('pid')} on {holder.get('host')}, since {holder.get('since')}"
+        )
+    return (
+        f"{folder}: another driver writes results here{owner}; wait for it, or name another --out"
+    )

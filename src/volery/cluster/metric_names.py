@@ -109,14 +109,18 @@ def source_of(function: str, folder: Path) -> Path | None:
     if module.endswith(".py"):
         path = folder / module
         return path if path.is_file() else None
-    places: list[str] | None = None
+    search_paths: list[str] | None = None
     spec = None
     for k, part in enumerate(module.split(".")):
         name = ".".join(module.split(".")[: k + 1])
-        spec = PathFinder.find_spec(name, places) or (k == 0 and _local_spec(part, folder)) or None
+        spec = (
+            PathFinder.find_spec(name, search_paths)
+            or (k == 0 and _local_spec(part, folder))
+            or None
+        )
         if spec is None:
             return None
-        places = list(spec.submodule_search_locations or ())
+        search_paths = list(spec.submodule_search_locations or ())
     return Path(spec.origin) if spec is not None and spec.origin else None
 
 

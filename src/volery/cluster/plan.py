@@ -60,12 +60,12 @@ class RunPlan:
 
     def take(self, count: int) -> tuple[RunSpec, ...]:
         """Removes and returns up to `count` missing runs of one point."""
-        taken: list[RunSpec] = []
-        while self._missing and len(taken) < count:
-            if taken and self._missing[0].point != taken[0].point:
+        batch: list[RunSpec] = []
+        while self._missing and len(batch) < count:
+            if batch and self._missing[0].point != batch[0].point:
                 break
-            taken.append(self._missing.popleft())
-        return tuple(taken)
+            batch.append(self._missing.popleft())
+        return tuple(batch)
 
     def missing_of_next_point(self, limit: int) -> int:
         """Returns the number of missing runs of the point that comes next, up to `limit`."""

@@ -32,7 +32,7 @@ _LOOK_S = 2.0
 _SILENCE_S = 6.0
 """Time without a sign of life after which a worker is lost."""
 _FAREWELL_S = 30.0
-_MOST_BYTES = 200_000_000
+_MAX_BYTES = 200_000_000
 """Limit of a study's folder, which each machine receives."""
 _CODE = ["*.py", "*.pyc", "*.so", "*.pth"]
 _LARGE = [".git/", ".venv/", "runs/", "*.mcap", "*.bag", "*.db3"]
@@ -83,15 +83,15 @@ def ray_pool(job: StudyJob, address: str, workers: int | None) -> WorkerPool:
 def _check_size(folder: Path) -> None:
     """Raises `StudyError` for a folder that is too large to be copied."""
     size = 0
-    for place, folders, names in os.walk(folder):
+    for parent, folders, names in os.walk(folder):
         folders[:] = [each for each in folders if f"{each}/" not in _LARGE]
         for name in names:
             if f"*{Path(name).suffix}" not in _LARGE:
                 with contextlib.suppress(OSError):
-                    size += os.lstat(os.path.join(place, name)).st_size
-        if size > _MOST_BYTES:
+                    size += os.lstat(os.path.join(parent, name)).st_size
+        if size > _MAX_BYTES:
             raise StudyError(
-                f"{folder} holds more than {_MOST_BYTES / 1e6:.0f} MB, too much for each machine "
+                f"{folder} holds more than {_MAX_BYTES / 1e6:.0f} MB, too much for each machine "
                 "of the cluster: put the study and its files into a folder of its own"
             )
 

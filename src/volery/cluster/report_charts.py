@@ -19,7 +19,7 @@ from volery.figures.palette import FAINT, INK, UAV_COLORS
 
 _BLUE, _ORANGE = UAV_COLORS[0], UAV_COLORS[1]
 _BINS, _CURVE_BINS = 24, 8
-_LEAST_IN_BIN = 2
+_MIN_PER_BIN = 2
 _MAX_DOTS = 4000
 _MAX_TEXT = 12
 _MAP = LinearSegmentedColormap.from_list("study", ["#e8590c", "#f4d58d", "#2c8a5b"])
@@ -65,13 +65,13 @@ def sensitivity_chart(parameter: ParameterAxis, values: Array, label: str) -> st
             alpha=0.35,
             markeredgewidth=0.0,
         )
-    places, estimates = _means(parameter, np.where(finite, values, np.nan))
+    positions, estimates = _means(parameter, np.where(finite, values, np.nan))
     middle = [estimate.mean for estimate in estimates]
     low = [max(estimate.mean - estimate.low, 0.0) for estimate in estimates]
     high = [max(estimate.high - estimate.mean, 0.0) for estimate in estimates]
     bars = np.nan_to_num(np.array([low, high]), posinf=0.0)
     axes.errorbar(
-        places,
+        positions,
         middle,
         yerr=bars,
         color=_ORANGE,
@@ -120,8 +120,8 @@ def success_map(
             for (row, column), mean in np.ndenumerate(means):
                 if np.isfinite(mean):
                     text = f"{mean:.2f}" if limits == (0.0, 1.0) else f"{mean:.3g}"
-                    place = (column + 0.5, row + 0.5)
-                    axes.annotate(text, place, ha="center", va="center", fontsize=8.5)
+                    centre = (column + 0.5, row + 0.5)
+                    axes.annotate(text, centre, ha="center", va="center", fontsize=8.5)
         axes.grid(visible=False)
     else:
         shown = np.isfinite(values)
@@ -148,8 +148,8 @@ def success_map(
 
 
 def _means(parameter: ParameterAxis, values: Array) -> tuple[list[float], list[MeanEstimate]]:
-    """Returns places and means: of each level, or of bins with equally many runs."""
-    places: list[float] = []
+    """Returns positions and means: of each level, or of bins with equally many runs."""
+    positions: list[float] = []
     estimates: list[MeanEstimate] = []
     if parameter.levels:
         own = parameter.level_of()
@@ -161,14 +161,14 @@ def _means(parameter: ParameterAxis, values: Array) -> tuple[list[float], list[M
         groups = [
             (float(np.median(parameter.numbers[bins == k])), bins == k)
             for k in range(_CURVE_BINS)
-            if (bins == k).sum() >= _LEAST_IN_BIN
+            if (bins == k).sum() >= _MIN_PER_BIN
         ]
-    for place, chosen in groups:
+    for position, chosen in groups:
         estimate = estimate_mean(values[chosen].tolist())
         if estimate.count:
-            places.append(place)
+            positions.append(position)
             estimates.append(estimate)
-    return places, estimates
+    return positions, estimates
 
 
 def _mean_grid(across: ParameterAxis, up: ParameterAxis, values: Array) -> Array:

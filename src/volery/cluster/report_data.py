@@ -14,7 +14,7 @@ from volery.core.arrays import Array
 
 _MAX_LEVELS = 24
 """Distinct values up to which the runs of each value are drawn together."""
-_LEAST_RANKED = 3
+_MIN_RANKED = 3
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ def parameter_axis(table: StudyTable, name: str) -> ParameterAxis:
         distinct = tuple(np.unique(numbers).tolist())
         return ParameterAxis(name, numbers, distinct if len(distinct) <= _MAX_LEVELS else (), True)
     levels = tuple(dict.fromkeys(values))
-    places = {level: k for k, level in enumerate(levels)}
-    numbers = np.array([places[value] for value in values], np.float64)
+    index_of_level = {level: k for k, level in enumerate(levels)}
+    numbers = np.array([index_of_level[value] for value in values], np.float64)
     return ParameterAxis(name, numbers, levels, False)
 
 
@@ -76,7 +76,7 @@ def varies(values: Array) -> bool:
 def rank_correlation(one: Array, other: Array) -> float:
     """Returns Spearman's rank correlation of two arrays (N,); nan if one does not vary."""
     both = np.isfinite(one) & np.isfinite(other)
-    if both.sum() < _LEAST_RANKED or not (varies(one[both]) and varies(other[both])):
+    if both.sum() < _MIN_RANKED or not (varies(one[both]) and varies(other[both])):
         return np.nan
     return float(np.corrcoef(_ranks(one[both]), _ranks(other[both]))[0, 1])
 

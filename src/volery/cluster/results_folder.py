@@ -1,4 +1,4 @@
-"""The results of a study on disk: one file for each run, put into its place whole."""
+"""The results of a study on disk: one file for each run, written whole."""
 
 from __future__ import annotations
 

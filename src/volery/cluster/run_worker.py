@@ -85,8 +85,8 @@ class RunWorker:
             reason = "an expectation needs a simulation of its own"
         if self._study.logs == "all":
             reason = "all runs are recorded"
-        most = max_environments(scenario, self._study.sample_rate_hz)
-        return Preparation(code_version(), reason or obstacle(scenario), most)
+        max_envs = max_environments(scenario, self._study.sample_rate_hz)
+        return Preparation(code_version(), reason or obstacle(scenario), max_envs)
 
     def fly(self, batch: RunBatch) -> BatchResult:
         """Flies a batch; a run that fails has the traceback in its result.

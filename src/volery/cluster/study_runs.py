@@ -250,5 +250,5 @@ def worst_runs(loaded: LoadedStudy, plan: RunPlan, count: int | None = None) -> 
         value = plan.results[run.id].metrics.get(name) if run.id in plan.results else None
         if value is not None and not math.isnan(value):
             rated.append((sign * value, len(rated), run))
-    most = count or (5 if worst is None else worst.count)
-    return [run for _, _, run in sorted(rated, key=lambda each: each[:2])[:most]]
+    num_runs = count or (5 if worst is None else worst.count)
+    return [run for _, _, run in sorted(rated, key=lambda each: each[:2])[:num_runs]]

@@ -21,7 +21,7 @@ class Variation:
     key: str
     """Path of keys, or `wind`: a speed along x, m/s."""
     low: float
-    """Least value."""
+    """Minimum value."""
     high: float
     """Greatest value."""
 

@@ -18,7 +18,7 @@ _WELCOME = struct.Struct("<II")
 _REFUSAL = struct.Struct("<BI")
 _RECEIVED = struct.Struct("<HII")
 _LONGEST_TEXT_BYTES = 255
-MOST_SEQUENCES = 4000
+MAX_SEQUENCES = 4000
 """Max number in one frame, below the limit of payloads."""
 
 

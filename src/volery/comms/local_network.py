@@ -59,7 +59,7 @@ class LocalNetwork:
         )
         connection = self._router.connect(now_ns)
         if connection is None:
-            raise CommsError(f"no more than {self._settings.most_connections} stations can join")
+            raise CommsError(f"no more than {self._settings.max_connections} stations can join")
         self._joined += 1
         self._stations[connection] = core
         core.connected(now_ns)

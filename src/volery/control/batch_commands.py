@@ -29,11 +29,11 @@ def command_velocities(
     level heading frame; yaw_rate: (N,) rad/s. UAVs that are on the ground, crashed or taking off
     are skipped.
     """
-    hears = ~np.isin(control_states["mode"], [int(mode) for mode in _DEAF])
-    bodies["still_steps"][hears] = 0
-    bodies["ground_budget"][hears] = 0.0
-    bodies["downwash_budget"][hears] = 0.0
-    fresh = np.flatnonzero(hears & (control_states["level"] != ControlLevel.GUIDED))
+    accepts = ~np.isin(control_states["mode"], [int(mode) for mode in _DEAF])
+    bodies["still_steps"][accepts] = 0
+    bodies["ground_budget"][accepts] = 0.0
+    bodies["downwash_budget"][accepts] = 0.0
+    fresh = np.flatnonzero(accepts & (control_states["level"] != ControlLevel.GUIDED))
     if len(fresh):
         yaw = rotations.yaw_of(bodies["attitude"][fresh])
         heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
@@ -43,13 +43,13 @@ def command_velocities(
         control_states["acceleration"][fresh] = 0.0
         control_states["velocity_integral"][fresh] = 0.0
         control_states["heading"][fresh] = control_states["heading_target"][fresh] = heading
-    control_states["mode"][hears] = FlightMode.VELOCITY
-    control_states["calm_ticks"][hears] = 0
-    control_states["velocity_target"][hears] = velocity[hears]
-    control_states["velocity_in_heading"][hears] = True
-    control_states["deadline_step"][hears] = step + control_states["timeout_steps"][hears]
-    control_states["turning"][hears] = True
-    control_states["yaw_rate_target"][hears] = yaw_rate[hears]
+    control_states["mode"][accepts] = FlightMode.VELOCITY
+    control_states["calm_ticks"][accepts] = 0
+    control_states["velocity_target"][accepts] = velocity[accepts]
+    control_states["velocity_in_heading"][accepts] = True
+    control_states["deadline_step"][accepts] = step + control_states["timeout_steps"][accepts]
+    control_states["turning"][accepts] = True
+    control_states["yaw_rate_target"][accepts] = yaw_rate[accepts]
 
 
 def command_low_level(

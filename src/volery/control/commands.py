@@ -329,10 +329,10 @@ class FleetCommands:
             raise CommandError(
                 f"{self.names[i]} cannot take off: it is flying ({self.mode(i).name})"
             )
-        place = self._believed(i).position
-        self._control_states["home"][i] = place
+        position = self._believed(i).position
+        self._control_states["home"][i] = position
         control_state = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
-        control_state["position_target"] = place + np.array([0.0, 0.0, altitude_m])
+        control_state["position_target"] = position + np.array([0.0, 0.0, altitude_m])
 
     def hold(self, i: int) -> None:
         """Stops UAV `i` and holds the position at which it comes to rest."""
@@ -396,15 +396,15 @@ class FleetCommands:
         airframe = self.airframes[i]
         lift = max(0.0, float(acceleration[2]) + GRAVITY)
         level = np.array(acceleration[:2])
-        size, most = (
+        size, limit = (
             float(np.linalg.norm(level)),
             lift * math.tan(math.radians(airframe.limits.tilt_deg)),
         )
-        if size > most:
-            level *= most / size
+        if size > limit:
+            level *= limit / size
         if angle is None:
             angle = float(rotations.yaw_of(self._believed(i).attitude))
-        most_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        max_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
         thrust = airframe.body.mass_kg * math.hypot(*level, lift)
         control_state = self._enter_low_level(i, ControlLevel.ATTITUDE)
         up = np.array([-level[1], level[0], 0.0, math.hypot(*level, lift) + lift])
@@ -413,7 +413,7 @@ class FleetCommands:
         control_state["attitude"] = (
             rotations.multiply(rotations.normalize(up), facing) if upright else facing
         )
-        control_state["thrust"] = min(thrust, most_thrust)
+        control_state["thrust"] = min(thrust, max_thrust)
         control_state["yaw_rate"] = rate
 
     # -------------------------------------------------------------------------------- inside
@@ -432,8 +432,8 @@ class FleetCommands:
 
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]
-        most = len(airframe.rotors.places) * airframe.max_rotor_thrust
-        return float(checked_within("thrust", thrust, (), most))
+        max_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        return float(checked_within("thrust", thrust, (), max_thrust))
 
     def _wake(self, i: int) -> None:
         if self._bodies["on_ground"][i] or self._bodies["asleep"][i]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers
 
-_LEAST_ROWS = 64
+_MIN_ROWS = 64
 """UAVs of a part."""
 _PARTS_A_THREAD = 3
 """A thread whose core does other work as well takes fewer parts."""
@@ -49,7 +49,7 @@ class StepResult(NamedTuple):
 
 def is_worth_dividing(workers: Workers, count: int) -> bool:
     """Returns whether threads save time in a fleet of `count` UAVs."""
-    return workers.threads > 1 and count >= 4 * _LEAST_ROWS
+    return workers.threads > 1 and count >= 4 * _MIN_ROWS
 
 
 def advance_in_parts(
@@ -65,11 +65,11 @@ def advance_in_parts(
     """
     guidance_steps, _, air_steps = periods
     count = whole.last
-    size = max(_LEAST_ROWS, -(-count // (_PARTS_A_THREAD * workers.threads)))
+    size = max(_MIN_ROWS, -(-count // (_PARTS_A_THREAD * workers.threads)))
     firsts = range(0, count, size)
     done = written = 0
     calm, look, spent = whole.calm, whole.look, False
-    share = len(whole.events) // len(firsts)
+    num_events = len(whole.events) // len(firsts)
     while done < whole.steps and not spent and not written:
         step = whole.step + done
         to_tick = guidance_steps - step % guidance_steps
@@ -88,7 +88,7 @@ def advance_in_parts(
                     together,
                     first,
                     min(first + size, count),
-                    whole.events[k * share : (k + 1) * share],
+                    whole.events[k * num_events : (k + 1) * num_events],
                     calm,
                     look=False,
                 )

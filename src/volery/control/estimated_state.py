@@ -68,7 +68,7 @@ def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
 
 
 @inner_kernel
-def believe_place(belief: Any, body: Any) -> None:
+def believe_position(belief: Any, body: Any) -> None:
     """Updates the estimated position and velocity."""
     for k in range(3):
         belief.position_map[k] = body.position_map[k] + belief.position_error[k]

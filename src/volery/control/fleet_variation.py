@@ -68,7 +68,7 @@ class FleetVariation:
         """(N, MAX_ROTORS) health of the rotors at a restart; nan: that of the start."""
         self.hover_speed = np.full((count, MAX_ROTORS), np.nan)
         """(N, MAX_ROTORS) rad/s of the rotors at a start in the air; nan: that of the airframe."""
-        self._share = np.zeros((count, MAX_ROTORS))
+        self._hover_fraction = np.zeros((count, MAX_ROTORS))
         """(N, MAX_ROTORS) each rotor's part of the thrust in hover."""
         self._times = {"rise": np.zeros(count), "fall": np.zeros(count)}
         """(N,) s, time constants of the motors."""
@@ -158,7 +158,7 @@ class FleetVariation:
             getattr(self, name)[rows] = np.nan if state is None else state[name][rows]
 
     def _set_hover_speeds(self, plant: Any, rows: NDArray[np.int64], mass: Array) -> None:
-        thrusts = self._share[rows] * (mass * GRAVITY)[:, None]
+        thrusts = self._hover_fraction[rows] * (mass * GRAVITY)[:, None]
         self.hover_speed[rows] = np.sqrt(thrusts / plant["thrust_constant"][rows, None])
 
     def _set_delays(self, plant: Any, rows: NDArray[np.int64], factor: Array) -> None:
@@ -175,6 +175,6 @@ class FleetVariation:
         for number, airframe in kinds.items():
             rows = numbers == number
             column = allocation_matrix(airframe)[:, 0]
-            self._share[rows, : len(column)] = column
+            self._hover_fraction[rows, : len(column)] = column
             for name, times in self._times.items():
                 times[rows] = getattr(airframe.rotors, f"{name}_time_s")

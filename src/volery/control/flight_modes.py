@@ -196,7 +196,7 @@ def _end_what_ended(
     slow = vx * vx + vy * vy + (0.0 if landing else vz * vz)
     overdue = landing and step >= control_state.deadline_step
     if control_state.braking and (slow < _STOPPED_M_S**2 or overdue):
-        _lock_place(control_state, estimate, gains)
+        _lock_position(control_state, estimate, gains)
     elif not control_state.braking:
         _change_mode(control_state, estimate)
 
@@ -216,12 +216,12 @@ def wanted_velocity(control_state: Any, estimate: Any, gains: Any) -> tuple[floa
 
 
 @inner_kernel
-def _lock_place(control_state: Any, estimate: Any, gains: Any) -> None:
+def _lock_position(control_state: Any, estimate: Any, gains: Any) -> None:
     """Sets the position target to the point at which the UAV will come to rest."""
     control_state.braking = False
     for k in range(3):
-        way = estimate.velocity_map[k] / gains.ease
-        control_state.position_target[k] = estimate.position_map[k] + way
+        offset = estimate.velocity_map[k] / gains.ease
+        control_state.position_target[k] = estimate.position_map[k] + offset
     if control_state.mode == RETURN:
         control_state.position_target[2] = control_state.return_height
 

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.air import feel_rain, refresh_air
-from volery.control.estimated_state import BELIEF, believe_attitude, believe_place, believed_rates
+from volery.control.estimated_state import (
+    BELIEF,
+    believe_attitude,
+    believe_position,
+    believed_rates,
+)
 from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.plant_dispatch import fly_otherwise
@@ -184,7 +189,7 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                     if references is None or model.kind == RIGID_BODY:
                         turning = phase == 0 or guided
                         if guided:
-                            believe_place(belief, body)
+                            believe_position(belief, body)
                         if turning:
                             believe_attitude(belief, body, control_state.errs)
                         if guided:
@@ -249,11 +254,13 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
             spent = spent or body.contact_budget <= 0.0 or body.separation_budget <= 0.0
             look = look or body.in_jet or body.downwash_budget <= 0.0
             if not body.asleep:
-                way = reach_m(body.velocity_map, guidance_steps * dt)
+                distance = travel_m(body.velocity_map, guidance_steps * dt)
                 to_others = min(body.contact_budget, body.separation_budget)
-                near = near or to_others <= way
+                near = near or to_others <= distance
                 calm = (
-                    calm and model.kind == RIGID_BODY and min(to_others, body.ground_budget) > way
+                    calm
+                    and model.kind == RIGID_BODY
+                    and min(to_others, body.ground_budget) > distance
                 )
         step += together
         done += together
@@ -263,11 +270,11 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
 
 
 @brief_kernel
-def reach_m(velocity: Any, seconds: float) -> float:
-    """Returns a safe bound of a UAV's way in the time between two guidance ticks, m.
+def travel_m(velocity: Any, seconds: float) -> float:
+    """Returns a safe bound of a UAV's travel in the time between two guidance ticks, m.
 
-    velocity: (3,) m/s now. Twice the way at this speed, plus that of an acceleration beyond any
-    UAV's.
+    velocity: (3,) m/s now. Twice the distance at this speed, plus that of an acceleration beyond
+    any UAV's.
     """
     vx, vy, vz = three(velocity)
     speed = abs(vx) + abs(vy) + abs(vz)

@@ -27,9 +27,9 @@ _AIR_PERIOD_S = 0.008
 """Minimum time between updates of the air; eddies and jets that affect a vehicle last longer."""
 _THRUST_RESERVE = 0.9
 """Fraction of the full thrust that guidance may use; the rest is for attitude control."""
-_LEAST_THRUST = 0.15
+_MIN_THRUST = 0.15
 """Minimum thrust of guidance as a fraction of the weight, which preserves attitude control."""
-_LEAST_INTEGRAL, _MOST_INTEGRAL = 0.5, 0.8
+_MIN_INTEGRAL, _MAX_INTEGRAL = 0.5, 0.8
 """Bounds of the integrals, in g. Flying 2 m below a similar UAV an F450 needs 0.4 g; a vehicle with
 much drag needs more in wind."""
 _IDLE_SPEED = 0.1
@@ -46,7 +46,7 @@ GAINS = np.dtype(
         ("by_pitch", "f8", MAX_ROTORS),
         ("by_yaw", "f8", MAX_ROTORS),
         ("idle_thrust", "f8"),
-        ("least_thrusts", "f8", MAX_ROTORS),  # idle_thrust; below zero where there is no rotor
+        ("min_thrusts", "f8", MAX_ROTORS),  # idle_thrust; below zero where there is no rotor
         ("inverse_thrust_constant", "f8"),
         ("rate", "f8", 3),
         ("rate_drag", "f8", 3),
@@ -80,15 +80,15 @@ GAINS = np.dtype(
         ("acceleration", "f8"),
         ("climb_acceleration", "f8"),
         ("tilt_tangent", "f8"),
-        ("least_thrust", "f8"),
-        ("most_thrust", "f8"),
+        ("min_thrust", "f8"),
+        ("max_thrust", "f8"),
         ("speed", "f8"),
         ("climb", "f8"),
         ("descent", "f8"),
         ("take_off", "f8"),
         ("landing", "f8"),
-        ("least_acceleration", "f8"),
-        ("most_acceleration", "f8"),
+        ("min_acceleration", "f8"),
+        ("max_acceleration", "f8"),
         ("tick", "f8"),
         ("inverse_tick", "f8"),
     ],
@@ -132,7 +132,7 @@ def gains_of(  # noqa: PLR0915
     inertia = np.array(airframe.body.inertia_kg_m2)
     allocation = allocation_matrix(airframe)
     trim = hover_thrusts(airframe)
-    most = airframe.max_rotor_thrust * airframe.weight / float(trim.max())
+    max_thrust = airframe.max_rotor_thrust * airframe.weight / float(trim.max())
 
     rate = wish.rate or 0.4 / (0.5 * (rotors.rise_time_s + rotors.fall_time_s))
     yaw_rate = wish.yaw_rate or 0.5 * rate
@@ -149,7 +149,7 @@ def gains_of(  # noqa: PLR0915
     for k, name in enumerate(("by_thrust", "by_roll", "by_pitch", "by_yaw")):
         row[name][0, :count] = allocation[:, k] * (1.0, *inertia)[k]
     row["idle_thrust"] = _IDLE_SPEED**2 * trim.min()
-    row["least_thrusts"] = np.where(np.arange(MAX_ROTORS) < count, row["idle_thrust"], -1.0)
+    row["min_thrusts"] = np.where(np.arange(MAX_ROTORS) < count, row["idle_thrust"], -1.0)
     row["inverse_thrust_constant"] = 1.0 / rotors.thrust_n_s2
     bandwidths = np.array([rate, rate, yaw_rate])
     row["rate"] = bandwidths
@@ -169,7 +169,7 @@ def gains_of(  # noqa: PLR0915
     row["rate_drag"] = _rate_drag(airframe, drags) / inertia
     # compensates for a steady wind as fast as the vehicle flies
     wind = drag_acceleration(airframe, limits.speed_m_s)
-    row["integral_limit"] = min(max(_LEAST_INTEGRAL * GRAVITY, wind), _MOST_INTEGRAL * GRAVITY)
+    row["integral_limit"] = min(max(_MIN_INTEGRAL * GRAVITY, wind), _MAX_INTEGRAL * GRAVITY)
     row["position"] = position
     level, height = level_gains(wish.horizontal, attitude), height_gains(wish.height, rate)
     for name, gain in level._asdict().items():
@@ -180,7 +180,8 @@ def gains_of(  # noqa: PLR0915
     row["brake"] = 0.6 * limits.acceleration_m_s2
     row["acceleration"] = limits.acceleration_m_s2
     row["climb_acceleration"] = min(
-        limits.acceleration_m_s2, 0.6 * (_THRUST_RESERVE * most / airframe.body.mass_kg - GRAVITY)
+        limits.acceleration_m_s2,
+        0.6 * (_THRUST_RESERVE * max_thrust / airframe.body.mass_kg - GRAVITY),
     )
     row["level_linear"] = row["brake"] / position**2
     row["height_brake"] = 0.6 * row["climb_acceleration"]
@@ -188,8 +189,8 @@ def gains_of(  # noqa: PLR0915
     row["level_leash"] = row["acceleration"] / level.position
     row["height_leash"] = row["climb_acceleration"] / height.position
     row["tilt_tangent"] = math.tan(math.radians(limits.tilt_deg))
-    row["least_thrust"] = _LEAST_THRUST * airframe.weight
-    row["most_thrust"] = _THRUST_RESERVE * most
+    row["min_thrust"] = _MIN_THRUST * airframe.weight
+    row["max_thrust"] = _THRUST_RESERVE * max_thrust
     row["speed"] = limits.speed_m_s
     row["climb"] = limits.climb_m_s
     row["descent"] = limits.descent_m_s
@@ -198,16 +199,16 @@ def gains_of(  # noqa: PLR0915
     row["tick"] = control.guidance_steps(dt) * dt
     row["inverse_tick"] = 1.0 / row["tick"]
     row["lead"] = 1.0 / attitude + row["tick"]
-    row["least_acceleration"] = row["least_thrust"] / airframe.body.mass_kg
-    row["most_acceleration"] = row["most_thrust"] / airframe.body.mass_kg
+    row["min_acceleration"] = row["min_thrust"] / airframe.body.mass_kg
+    row["max_acceleration"] = row["max_thrust"] / airframe.body.mass_kg
     return row
 
 
 def _rate_drag(airframe: Airframe, drags: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the torque (3,) about each body axis per rad/s, from the rotors' in-plane drag."""
     torque = np.zeros(3)
-    for place, drag in zip(airframe.rotors.places, drags, strict=True):
-        arm, axis = np.array(place.position_m), np.array(place.axis)
+    for rotor, drag in zip(airframe.rotors.places, drags, strict=True):
+        arm, axis = np.array(rotor.position_m), np.array(rotor.axis)
         moved = np.cross(np.eye(3), arm)  # row k: velocity of the hub for 1 rad/s about axis k
         across = moved - np.outer(moved @ axis, axis)
         torque += drag * np.cross(arm, across).diagonal()

@@ -27,9 +27,9 @@ def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> 
     rate: rad/s at which the target itself turns.
     """
     c, s = control_state.heading[0], control_state.heading[1]
-    most = gains.yaw_rate_limit * gains.tick
+    max_step = gains.yaw_rate_limit * gains.tick
     if control_state.turning:
-        step = min(max(control_state.yaw_rate_target * gains.tick, -most), most)
+        step = min(max(control_state.yaw_rate_target * gains.tick, -max_step), max_step)
         hc, hs = heading_of(estimate)
         # wait for a vehicle that has fallen 30 degrees behind
         if c * hc + s * hs < 0.866 and step * (hc * s - hs * c) > 0.0:
@@ -39,7 +39,7 @@ def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> 
         step = c * gs - s * gc  # the sine of the angle left
         if c * gc + s * gs < 0.0:
             step = math.copysign(1.0, step)
-        step = min(max(gains.tick * (gains.yaw * step + rate), -most), most)
+        step = min(max(gains.tick * (gains.yaw * step + rate), -max_step), max_step)
     # a turn by the small angle `step`, up to step^3 / 6, normalised by a Newton step
     turn = 1.0 - 0.5 * step * step
     c, s = c * turn - s * step, s * turn + c * step

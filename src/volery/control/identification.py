@@ -32,7 +32,7 @@ from volery.vehicle.identified import (
 )
 from volery.vehicle.plant_types import RigidBody
 
-_MOST_DEAD_TIME_S = 0.1
+_MAX_DEAD_TIME_S = 0.1
 
 
 def identify(airframe: Airframe, order: Literal[1, 2] = 2) -> IdentifiedModel:
@@ -56,7 +56,7 @@ def identify(airframe: Airframe, order: Literal[1, 2] = 2) -> IdentifiedModel:
     x = optimize.least_squares(
         tilt_errors,
         [0.02, *start, *start],
-        bounds=([0.0, *[1e-2] * 6], [_MOST_DEAD_TIME_S, *[100.0, 5.0, 2.0] * 2]),
+        bounds=([0.0, *[1e-2] * 6], [_MAX_DEAD_TIME_S, *[100.0, 5.0, 2.0] * 2]),
         x_scale=[0.01, *np.abs(start), *np.abs(start)],
     ).x
     dead_time = float(x[0])

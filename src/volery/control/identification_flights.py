@@ -81,13 +81,13 @@ def everything_at_once(airframe: Airframe, plant: Plant) -> IdentificationFlight
 def cruises(airframe: Airframe) -> tuple[Array, Array]:
     """Returns specific force and velocity in cruise, (K, 3) each, body axes, several speeds."""
     top = 0.6 * airframe.limits.speed_m_s
-    ways = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.7, 0.7)]
+    directions = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.7, 0.7)]
     speeds = (0.25 * top, 0.5 * top, top)
-    fleet = _fleet(airframe, RigidBody(), len(ways) * len(speeds))
+    fleet = _fleet(airframe, RigidBody(), len(directions) * len(speeds))
     fleet.set_command_timeout(60.0)
     for i in range(len(fleet)):
-        way = np.array([*ways[i % len(ways)], 0.0])
-        fleet.command_velocity_map(i, speeds[i // len(ways)] * way)
+        direction = np.array([*directions[i % len(directions)], 0.0])
+        fleet.command_velocity_map(i, speeds[i // len(directions)] * direction)
     forces, velocities = [], []
     for _ in range(100):
         fleet.advance(60, _AIR)
@@ -137,9 +137,9 @@ def _fly(airframe: Airframe, plant: Plant, inputs: Inputs, seconds: float) -> Id
     rows = []
     for k in range(round(seconds / SAMPLE_S)):
         if k % _COMMAND_SAMPLES == 0:
-            roll, pitch, yaw, share = inputs(k * SAMPLE_S)
-            share -= _CLIMB_FEEDBACK * float(state.velocity_map[0, 2])
-            thrust = share * airframe.weight
+            roll, pitch, yaw, fraction = inputs(k * SAMPLE_S)
+            fraction -= _CLIMB_FEEDBACK * float(state.velocity_map[0, 2])
+            thrust = fraction * airframe.weight
             fleet.command_attitude(0, rotations.from_rpy(roll, pitch, yaw), thrust)
         angles = rotations.to_rpy(state.attitude[0])
         rows.append(
@@ -158,6 +158,6 @@ def _fly(airframe: Airframe, plant: Plant, inputs: Inputs, seconds: float) -> Id
 
 
 def _fleet(airframe: Airframe, plant: Plant, count: int = 1) -> Fleet:
-    places = np.column_stack([10.0 * np.arange(count), np.zeros(count), np.zeros(count)])
+    positions = np.column_stack([10.0 * np.arange(count), np.zeros(count), np.zeros(count)])
     level = np.tile(rotations.IDENTITY, (count, 1))
-    return Fleet([airframe] * count, places, level, plants=plant)
+    return Fleet([airframe] * count, positions, level, plants=plant)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.control.estimated_state import believe_attitude, believe_place
+from volery.control.estimated_state import believe_attitude, believe_position
 from volery.control.flight_modes import (
     LAND,
     LANDED,
@@ -60,7 +60,7 @@ def fly_kinematic(
             control_state.position[k] = body.position_map[k]
             control_state.velocity[k] = body.velocity_map[k]
         control_state.heading[0], control_state.heading[1] = heading_of(body)
-        believe_place(belief, body)
+        believe_position(belief, body)
         believe_attitude(belief, body, control_state.errs)
         plan(control_state, belief, gains, paths, step, dt)
     if control_state.mode == VELOCITY:

@@ -35,18 +35,20 @@ def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, control_stat
         # thrusts below zero are recomputed below
         speed = roots(magnitudes(f) * gains.inverse_thrust_constant)
         put_lanes(control_state.rotor_reference, first, speed)
-        beyond |= any_outside(f, lanes_at(gains.least_thrusts, first), control_state.full_thrust)
+        beyond |= any_outside(f, lanes_at(gains.min_thrusts, first), control_state.full_thrust)
     control_state.saturated = beyond
     if control_state.saturated:
-        _share(gains, thrust, ax, ay, az, control_state)
+        _mix_rotors(gains, thrust, ax, ay, az, control_state)
 
 
 @inner_kernel
-def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any) -> None:
+def _mix_rotors(
+    gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any
+) -> None:
     """Mixes where a rotor's range is exceeded; see `mix`."""
     low, high = gains.idle_thrust, control_state.full_thrust
     # the largest fraction of roll and pitch at which a collective thrust keeps all rotors in range
-    share = 1.0
+    fraction = 1.0
     for a in range(gains.rotors):
         for b in range(gains.rotors):
             ca, cb = gains.by_thrust[a], gains.by_thrust[b]
@@ -56,17 +58,17 @@ def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, control_s
             need = ub / cb - ua / ca
             room = high / cb - low / ca
             if need > room:
-                share = min(share, max(room, 0.0) / need)
-    least, most = -math.inf, math.inf
+                fraction = min(fraction, max(room, 0.0) / need)
+    low_limit, high_limit = -math.inf, math.inf
     for r in range(gains.rotors):
         c = gains.by_thrust[r]
-        u = share * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
-        least = max(least, (low - u) / c)
-        most = min(most, (high - u) / c)
-    total = min(max(thrust, least), most)
+        u = fraction * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
+        low_limit = max(low_limit, (low - u) / c)
+        high_limit = min(high_limit, (high - u) / c)
+    total = min(max(thrust, low_limit), high_limit)
     turn = 1.0
     for r in range(gains.rotors):
-        f = gains.by_thrust[r] * total + share * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
+        f = gains.by_thrust[r] * total + fraction * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
         control_state.rotor_reference[r] = f
         y = gains.by_yaw[r] * az
         if y > 0.0:

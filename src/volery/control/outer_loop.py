@@ -48,9 +48,9 @@ def track(
         ex, ey, far = _level_error(control_state, estimate, gains)
         ax, ay = fx + gains.level_position * ex, fy + gains.level_position * ey
         if far:
-            share = gains.level_velocity / gains.level_position
-            ex += share * vx
-            ey += share * vy
+            factor = gains.level_velocity / gains.level_position
+            ex += factor * vx
+            ey += factor * vy
         level_learning = gains.level_integral
     else:
         ax, ay = fx + gains.velocity * ex + ix, fy + gains.velocity * ey + iy
@@ -67,17 +67,17 @@ def track(
         learning = gains.vertical_integral
 
     # height first
-    least, most = gains.least_acceleration, gains.most_acceleration
-    free_z = (az < most or ez < 0.0) and (az > least or ez > 0.0)
-    az = min(max(az, least), most)
-    reach = min(gains.tilt_tangent * az, math.sqrt(max(most * most - az * az, 0.0)))
+    min_az, max_az = gains.min_acceleration, gains.max_acceleration
+    free_z = (az < max_az or ez < 0.0) and (az > min_az or ez > 0.0)
+    az = min(max(az, min_az), max_az)
+    max_size = min(gains.tilt_tangent * az, math.sqrt(max(max_az * max_az - az * az, 0.0)))
     size = math.sqrt(ax * ax + ay * ay)
     free_xy = True
-    if size > reach:
+    if size > max_size:
         free_xy = ax * ex + ay * ey < 0.0
-        share = reach / size
-        ax *= share
-        ay *= share
+        factor = max_size / size
+        ax *= factor
+        ay *= factor
     bound = gains.integral_limit
     if free_xy:
         gain = level_learning * gains.tick
@@ -108,8 +108,8 @@ def _level_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, 
     near = _FAR * gains.level_leash
     if square <= near * near:
         return ex, ey, False
-    share = min(gains.level_leash / math.sqrt(square), 1.0)
-    return share * ex, share * ey, True
+    factor = min(gains.level_leash / math.sqrt(square), 1.0)
+    return factor * ex, factor * ey, True
 
 
 @inner_kernel
@@ -155,4 +155,4 @@ def _point_thrust(
         + ay * 2.0 * (qy * qz - qx * qw)
         + az * (1.0 - 2.0 * (qx * qx + qy * qy))
     )
-    control_state.thrust = min(max(gains.mass * along, gains.least_thrust), gains.most_thrust)
+    control_state.thrust = min(max(gains.mass * along, gains.min_thrust), gains.max_thrust)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery.control.estimated_state import believe_attitude, believe_place
+from volery.control.estimated_state import believe_attitude, believe_position
 from volery.control.flight_modes import guide
 from volery.control.kinematic_flight import fly_kinematic
 from volery.control.setpoints import ControlLevel
@@ -57,7 +57,7 @@ def fly_otherwise(
             dt,
         )
     if guiding:
-        believe_place(belief, body)
+        believe_position(belief, body)
         believe_attitude(belief, body, control_state.errs)
         guide(control_state, belief, gains, paths, step, dt)
     live = control_state.level != _STOPPED

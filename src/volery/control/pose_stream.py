@@ -35,7 +35,7 @@ _TELEPORT_FACTOR = 3.0
 _MIN_TELEPORT_M_S = 20.0
 _MIN_TELEPORT_RAD_S = math.radians(1000.0)
 _MISSED_POSES = 3.0
-_MIN_PATIENCE_S = 0.1
+_MIN_TIMEOUT_S = 0.1
 """The UAV stands still when no new pose came for this time and for `_MISSED_POSES` periods."""
 _SAME_POSE = 1e-9
 """Change, m and rad, below which a pose repeats the last one."""
@@ -69,12 +69,12 @@ def follow_pose(
     is_timed = min(stamp_ns, last_ns) > 0
     if is_timed and stamp_ns < last_ns:
         return False
-    way = position - control_state["position_target"]
+    offset = position - control_state["position_target"]
     turn = rotations.logarithm(
         rotations.multiply(rotations.conjugate(control_state["attitude"]), attitude)
     )
     deadline = int(control_state["deadline_step"])
-    is_repeated = max(np.linalg.norm(way), np.linalg.norm(turn)) < _SAME_POSE
+    is_repeated = max(np.linalg.norm(offset), np.linalg.norm(turn)) < _SAME_POSE
     if in_stream and is_repeated and deadline != NO_DEADLINE:
         return True
     if is_timed and stamp_ns == last_ns:
@@ -89,23 +89,23 @@ def follow_pose(
         control_state["pose_steps"] = 0
         control_state["deadline_step"] = NO_DEADLINE
         return True
-    is_measured = not _is_teleport(way, turn, period_s, limits)
+    is_measured = not _is_teleport(offset, turn, period_s, limits)
     if is_measured and is_timed:
-        control_state["velocity_target"] = way / gap_s
+        control_state["velocity_target"] = offset / gap_s
         control_state["rates"] = turn / gap_s
     elif is_measured:
         # A first-order filter. Poses that arrive together share the time since those before.
-        share = 1.0 - math.exp(-gap_s / _SMOOTHING_S)
+        fraction = 1.0 - math.exp(-gap_s / _SMOOTHING_S)
         if gap_s > 0.0:
-            a_second = share / gap_s
+            a_second = fraction / gap_s
         else:
             period_s = max(period_s, int(control_state["pose_steps"]) * dt)
             a_second = (1.0 - math.exp(-period_s / _SMOOTHING_S)) / period_s
-        for name, change in (("velocity_target", way), ("rates", turn)):
-            control_state[name] = (1.0 - share) * control_state[name] + a_second * change
+        for name, change in (("velocity_target", offset), ("rates", turn)):
+            control_state[name] = (1.0 - fraction) * control_state[name] + a_second * change
     control_state["pose_steps"] = max(1, round(period_s / dt))
-    patience_s = max(_MISSED_POSES * max(period_s, arrival_s), _MIN_PATIENCE_S)
-    end = step + max(1, round(patience_s / dt))
+    timeout_s = max(_MISSED_POSES * max(period_s, arrival_s), _MIN_TIMEOUT_S)
+    end = step + max(1, round(timeout_s / dt))
     is_burst = arrival_s < _MIN_PERIOD_S and deadline != NO_DEADLINE
     control_state["deadline_step"] = max(end, deadline) if is_burst else end
     return True
@@ -119,9 +119,9 @@ def _trusted(stamp_ns: int, last_ns: int, now_ns: int) -> int:
     return stamp_ns if is_simulated else NO_STAMP
 
 
-def _is_teleport(way: Array, turn: Array, period_s: float, limits: Limits) -> bool:
+def _is_teleport(offset: Array, turn: Array, period_s: float, limits: Limits) -> bool:
     fastest = max(limits.speed_m_s, limits.climb_m_s, limits.descent_m_s)
     speed = max(_TELEPORT_FACTOR * fastest, _MIN_TELEPORT_M_S)
     rate = max(_TELEPORT_FACTOR * math.radians(limits.rate_deg_s), _MIN_TELEPORT_RAD_S)
-    moved, turned = float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+    moved, turned = float(np.linalg.norm(offset)), float(np.linalg.norm(turn))
     return moved > speed * period_s or turned > rate * period_s

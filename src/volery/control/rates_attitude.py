@@ -26,9 +26,9 @@ _ATTITUDE = int(ControlLevel.ATTITUDE)
 def hold_rates(control_state: Any, ox: float, oy: float, oz: float, gains: Any, dt: float) -> None:
     """Computes rotor speeds from rates setpoint and thrust; (ox, oy, oz): body rates, rad/s."""
     if control_state.level <= _ROTORS:
-        most = 0.0 if control_state.level == _STOPPED else _full_speed(control_state, gains)
+        max_speed = 0.0 if control_state.level == _STOPPED else _full_speed(control_state, gains)
         for r in range(gains.rotors):
-            control_state.rotor_reference[r] = min(control_state.rotor_target[r], most)
+            control_state.rotor_reference[r] = min(control_state.rotor_target[r], max_speed)
         return
     gx, gy, gz = three(gains.gyroscopic)
     ax = _angular_acceleration(control_state, gains, 0, ox, dt) + gx * oy * oz

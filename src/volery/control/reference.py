@@ -49,9 +49,9 @@ def lead_level(control_state: Any, estimate: Any, gains: Any, speed: float) -> N
     dy = control_state.position[1] - estimate.position_map[1]
     square = dx * dx + dy * dy
     if square > gains.level_leash * gains.level_leash:
-        share = gains.level_leash / math.sqrt(square)
-        control_state.position[0] = estimate.position_map[0] + share * dx
-        control_state.position[1] = estimate.position_map[1] + share * dy
+        factor = gains.level_leash / math.sqrt(square)
+        control_state.position[0] = estimate.position_map[0] + factor * dx
+        control_state.position[1] = estimate.position_map[1] + factor * dy
     vx, vy = control_state.velocity[0], control_state.velocity[1]
     dx = control_state.position_target[0] - control_state.position[0]
     dy = control_state.position_target[1] - control_state.position[1]
@@ -128,21 +128,21 @@ def brake_height(control_state: Any, estimate: Any, gains: Any) -> None:
 
 
 @inner_kernel
-def _choose_level(control_state: Any, gains: Any, ax: float, ay: float, most_change: float) -> None:
+def _choose_level(control_state: Any, gains: Any, ax: float, ay: float, max_change: float) -> None:
     square = ax * ax + ay * ay
     if square > gains.acceleration * gains.acceleration:
-        share = gains.acceleration / math.sqrt(square)
-        ax *= share
-        ay *= share
+        factor = gains.acceleration / math.sqrt(square)
+        ax *= factor
+        ay *= factor
     dx, dy = ax - control_state.acceleration[0], ay - control_state.acceleration[1]
     square = dx * dx + dy * dy
-    share = most_change / math.sqrt(square) if square > most_change * most_change else 1.0
-    control_state.acceleration[0] += share * dx
-    control_state.acceleration[1] += share * dy
+    factor = max_change / math.sqrt(square) if square > max_change * max_change else 1.0
+    control_state.acceleration[0] += factor * dx
+    control_state.acceleration[1] += factor * dy
 
 
 @inner_kernel
-def _choose_height(control_state: Any, gains: Any, az: float, most_change: float) -> None:
+def _choose_height(control_state: Any, gains: Any, az: float, max_change: float) -> None:
     az = min(max(az, -gains.climb_acceleration), gains.climb_acceleration)
     change = az - control_state.acceleration[2]
-    control_state.acceleration[2] += min(max(change, -most_change), most_change)
+    control_state.acceleration[2] += min(max(change, -max_change), max_change)

@@ -16,15 +16,15 @@ from typing import NamedTuple
 
 from volery.vehicle.airframe import TrackingPoles
 
-_SHARE_OF_ATTITUDE = 0.25
+_FRACTION_OF_ATTITUDE = 0.25
 """wn / e of the horizontal axes, fraction of the attitude loop's bandwidth: a third to a fifth is
 the rule."""
-_SHARE_OF_RATE = 0.14
+_FRACTION_OF_RATE = 0.14
 """wn / e of height, fraction of the rate loop's bandwidth. Modelling choice: the rotors alone would
 allow more, but thrust acts through the attitude, and so does noise of the estimate."""
 _DAMPING = 0.9
 """Damping zeta (modelling choice); the loop below reduces it."""
-_INTEGRAL_SHARE = 0.25
+_INTEGRAL_FRACTION = 0.25
 """ki, fraction of wn (modelling choice): steady disturbances are compensated four times slower."""
 
 
@@ -50,15 +50,15 @@ def tracking_gains(wn: float, zeta: float, ki: float, epsilon: float) -> Trackin
 
 def level_gains(wish: TrackingPoles, attitude: float) -> TrackingGains:
     """Returns gains of both horizontal axes over an attitude loop of bandwidth `attitude` rad/s."""
-    return _gains(wish, _SHARE_OF_ATTITUDE * attitude)
+    return _gains(wish, _FRACTION_OF_ATTITUDE * attitude)
 
 
 def height_gains(wish: TrackingPoles, rate: float) -> TrackingGains:
     """Returns gains of the vertical axis over a rate loop of bandwidth `rate` rad/s."""
-    return _gains(wish, _SHARE_OF_RATE * rate)
+    return _gains(wish, _FRACTION_OF_RATE * rate)
 
 
 def _gains(wish: TrackingPoles, bandwidth: float) -> TrackingGains:
     wn = bandwidth * wish.epsilon if wish.wn is None else wish.wn
-    ki = _INTEGRAL_SHARE * wn if wish.ki is None else wish.ki
+    ki = _INTEGRAL_FRACTION * wn if wish.ki is None else wish.ki
     return tracking_gains(wn, _DAMPING if wish.zeta is None else wish.zeta, ki, wish.epsilon)

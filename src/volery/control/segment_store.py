@@ -12,7 +12,7 @@ from volery.control.flight_modes import FlightMode
 from volery.control.trajectory_kernels import SEGMENT_COLUMNS
 from volery.core.arrays import Array
 
-_LEAST_ROWS = 64
+_MIN_ROWS = 64
 
 
 class SegmentStore:
@@ -26,7 +26,7 @@ class SegmentStore:
     def __init__(self, control_states: NDArray[np.void]) -> None:
         self._control_states = control_states
         self._used = 0
-        self.rows: Array = np.zeros((_LEAST_ROWS, SEGMENT_COLUMNS))
+        self.rows: Array = np.zeros((_MIN_ROWS, SEGMENT_COLUMNS))
 
     def put(self, i: int, segments: Array) -> None:
         """Stores the trajectory `segments` (S, SEGMENT_COLUMNS) of control_state `i`."""
@@ -64,7 +64,7 @@ class SegmentStore:
     def set_state(self, state: Array) -> None:
         """Restores a `get_state`; the caller restores the control_states."""
         self._used = len(state)
-        self.rows = np.zeros((max(_LEAST_ROWS, len(state)), SEGMENT_COLUMNS))
+        self.rows = np.zeros((max(_MIN_ROWS, len(state)), SEGMENT_COLUMNS))
         self.rows[: self._used] = state
 
     def _make_room(self, wanted: int) -> None:
@@ -77,7 +77,7 @@ class SegmentStore:
             for i in live
         ]
         used = sum(len(block) for block in blocks)
-        rows = np.zeros((max(_LEAST_ROWS, 2 * (used + wanted)), SEGMENT_COLUMNS))
+        rows = np.zeros((max(_MIN_ROWS, 2 * (used + wanted)), SEGMENT_COLUMNS))
         self._used = 0
         for i, block in zip(live, blocks, strict=True):
             shift = self._used - control_states["path_first"][i]

@@ -34,7 +34,7 @@ class StabilityTerm(NamedTuple):
     """The number of the data file that determines it."""
     owner: str
     """The data file's subject, such as `airframe 'f450'`."""
-    share: float
+    fraction: float
     """Fraction of the motion that the term removes in a step."""
 
 
@@ -48,16 +48,16 @@ def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> l
     else:
         found, owner = _rigid_body(airframe, speed_m_s), f"airframe '{airframe.name}'"
     terms = [StabilityTerm(key, owner, rate * dt) for key, rate in found.items()]
-    return sorted(terms, key=lambda term: -term.share)
+    return sorted(terms, key=lambda term: -term.fraction)
 
 
 def check_stability(airframe: Airframe, plant: Plant, dt: float) -> None:
     """Raises `DataFileError` if a term is too stiff for a step of `dt` s at usual speeds."""
     for term in terms_of(airframe, plant, dt, airframe.limits.speed_m_s + MAX_WIND_M_S):
-        if not term.share < STABLE_BELOW:
+        if not term.fraction < STABLE_BELOW:
             raise DataFileError(
                 f"{term.owner}: {term.key} cannot be computed with a physics step of "
-                f"{1e3 * dt:g} ms: it removes {term.share:.3g} of the motion in each step, and "
+                f"{1e3 * dt:g} ms: it removes {term.fraction:.3g} of the motion in each step, and "
                 f"less than {STABLE_BELOW:g} is stable; use a smaller {term.key} or, if it "
                 "is right, a higher physics.rate_hz"
             )
@@ -67,14 +67,14 @@ def _rigid_body(airframe: Airframe, speed_m_s: float) -> dict[str, float]:
     """Returns the rates, 1/s, at which each number brakes the motion."""
     body, rotors = airframe.body, airframe.rotors
     count, full = len(rotors.places), rotors.max_speed_rad_s
-    arms = np.array([math.hypot(*place.position_m) for place in rotors.places])
-    least = min(body.inertia_kg_m2)
+    arms = np.array([math.hypot(*rotor.position_m) for rotor in rotors.places])
+    min_inertia = min(body.inertia_kg_m2)
     inflow = airframe.max_rotor_thrust / INFLOW_SPEED  # N s/m, of one rotor
     drag = rotors.drag_n_s2_m * full
     squares, lengths = float((arms**2).sum()), float(arms.sum())
     return {
         "body.drag_area_m2": AIR_DENSITY * max(body.drag_area_m2) * speed_m_s / body.mass_kg,
-        "rotors.drag_n_s2_m": max(drag * count / body.mass_kg, drag * squares / least),
-        "rotors.thrust_n_s2": max(inflow * count / body.mass_kg, inflow * squares / least),
-        "rotors.rolling_n_s2": rotors.rolling_n_s2 * full * lengths / least,
+        "rotors.drag_n_s2_m": max(drag * count / body.mass_kg, drag * squares / min_inertia),
+        "rotors.thrust_n_s2": max(inflow * count / body.mass_kg, inflow * squares / min_inertia),
+        "rotors.rolling_n_s2": rotors.rolling_n_s2 * full * lengths / min_inertia,
     }

@@ -74,7 +74,7 @@ class Trajectory:
 
         Without accelerations they are cubic. times: (K,) s, increasing, K > 1. position: (K, 3) m,
         map; velocity: (K, 3) m/s; acceleration: (K, 3) m/s^2, only with velocities; yaw: (K,) rad,
-        turning the shorter way between samples; yaw_rate: (K,) rad/s, only with yaws. Default
+        turning the shorter arc between samples; yaw_rate: (K,) rad/s, only with yaws. Default
         velocities are those of the parabola through three neighbours, and zero at both ends. Raises
         `CommandError` for other arrays.
         """
@@ -222,19 +222,19 @@ def _slopes(t: Array, p: Array) -> Array:
 def _hermite(t: Array, p: Array, v: Array, a: Array | None) -> Array:
     """Returns coefficients (K - 1, 6) of polynomials through samples (K,) and derivatives."""
     h = np.diff(t)
-    way = p[1:] - p[:-1] - h * v[:-1]
+    offset = p[1:] - p[:-1] - h * v[:-1]
     turn = (v[1:] - v[:-1]) * h
     c = np.zeros((len(h), ORDER))
     c[:, 0], c[:, 1] = p[:-1], v[:-1]
     if a is None:
-        c[:, 2] = (3.0 * way - turn) / h**2
-        c[:, 3] = (turn - 2.0 * way) / h**3
+        c[:, 2] = (3.0 * offset - turn) / h**2
+        c[:, 3] = (turn - 2.0 * offset) / h**3
         return c
     bend, left = 0.5 * a[:-1] * h**2, 0.5 * a[1:] * h**2
-    way, turn = way - bend, turn - 2.0 * bend
+    offset, turn = offset - bend, turn - 2.0 * bend
     left = left - bend
     c[:, 2] = 0.5 * a[:-1]
-    c[:, 3] = (10.0 * way - 4.0 * turn + left) / h**3
-    c[:, 4] = (-15.0 * way + 7.0 * turn - 2.0 * left) / h**4
-    c[:, 5] = (6.0 * way - 3.0 * turn + left) / h**5
+    c[:, 3] = (10.0 * offset - 4.0 * turn + left) / h**3
+    c[:, 4] = (-15.0 * offset + 7.0 * turn - 2.0 * left) / h**4
+    c[:, 5] = (6.0 * offset - 3.0 * turn + left) / h**5
     return c

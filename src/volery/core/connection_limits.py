@@ -46,11 +46,11 @@ class ConnectionLimits:
 
     def enter(self, listener: str, address: str) -> str | None:
         """Counts a new connection, or returns the reason why there is no room."""
-        most = self.max_connections
-        part = most - most // 4
+        limit = self.max_connections
+        part = limit - limit // 4
         with self._lock:
-            if self._listeners.total() >= most:
-                return f"{most} connections to all ports"
+            if self._listeners.total() >= limit:
+                return f"{limit} connections to all ports"
             if self._listeners[listener] >= part:
                 return f"{part} connections to this port"
             if self._addresses[address] >= part and not is_loopback(address):

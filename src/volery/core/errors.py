@@ -144,5 +144,5 @@ def reason_of(error: Exception) -> str:
     number = error.errno if isinstance(error, OSError) else None
     if number is not None and number > 0:  # those of failed name look-ups are negative
         return os.strerror(number)
-    told = error.strerror if isinstance(error, OSError) else None
-    return told or str(error) or type(error).__name__
+    reason = error.strerror if isinstance(error, OSError) else None
+    return reason or str(error) or type(error).__name__

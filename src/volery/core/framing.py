@@ -24,7 +24,7 @@ CRC_BYTES = 2
 
 _CRC = struct.Struct("<H")
 _SPARE_WORK_BYTES = 4 << 20
-_MOST_SPARED_BYTES = 256 << 20
+_MAX_SPARE_BYTES = 256 << 20
 _WORK_PER_BYTE = 4
 """Maximum of bytes checked per byte received, plus the spare bytes.
 
@@ -173,7 +173,7 @@ class FrameScanner(ABC, Generic[T]):
     def _whole(self, position: int, size: int) -> bool:
         """Returns whether the frame that starts here is undamaged."""
         end = position + size - CRC_BYTES
-        self._work_left = min(self._work_left, _MOST_SPARED_BYTES) - size
+        self._work_left = min(self._work_left, _MAX_SPARE_BYTES) - size
         (check,) = _CRC.unpack_from(self._data, end)
         start = position + len(self._sync)
         with memoryview(self._data) as view, view[start:end] as checked:

@@ -109,8 +109,8 @@ class LocalFrame:
 
     def enu_from_ecef(self, ecef: ArrayLike) -> Array:
         """Returns the ENU positions of ECEF positions."""
-        way = np.asarray(ecef, dtype=np.float64) - ecef_from_geodetic(self.origin_geodetic)
-        return np.asarray(way @ self.enu_from_ecef_matrix.T)
+        offset = np.asarray(ecef, dtype=np.float64) - ecef_from_geodetic(self.origin_geodetic)
+        return np.asarray(offset @ self.enu_from_ecef_matrix.T)
 
     def geodetic_from_enu(self, enu: ArrayLike) -> Array:
         """Returns the geodetic coordinates of ENU positions."""

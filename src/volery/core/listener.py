@@ -218,13 +218,13 @@ class Listener(socket.socket):
 
     def _enter(self, accepted: _Accepted, address: str) -> str | None:
         """Makes room for a connection and counts it; or returns the reason for a refusal."""
-        most, unproven = self._max_connections, self._max_unproven
+        limit, unproven = self._max_connections, self._max_unproven
         if unproven is not None:
             unproven = min(unproven, max(1, self._limits.max_connections // 4))
             if len(self._unproven) >= unproven:
                 self._evict(f"{unproven} without a valid request")
-        if most is not None and len(self._open) - self._evicted >= most:
-            full = f"{most} connections"
+        if limit is not None and len(self._open) - self._evicted >= limit:
+            full = f"{limit} connections"
             if not self._evict(full):
                 return full
         reason = self._limits.enter(self._key, address)

@@ -1,7 +1,7 @@
 """Folders from which Volery reads code or decisions: no other user may write there.
 
-Compiled kernels are unpickled and run, and a saved answer starts modules. Whoever can write or
-exchange the files behind them runs code as the user who reads them.
+Compiled kernels are unpickled and run, and a saved answer starts modules. A user that can write or
+exchange the files behind them runs code as the user that reads them.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ def private_folder(base: Path, *below: str) -> Path:
 
     """
     folder = base.absolute().resolve()  # a link that changes later has no effect
-    for place in (*reversed(folder.parents), folder):
-        if not place.exists():
-            place.mkdir(mode=0o700, exist_ok=True)
+    for directory in (*reversed(folder.parents), folder):
+        if not directory.exists():
+            directory.mkdir(mode=0o700, exist_ok=True)
     check_above(folder)
     reason = ""
     for name in below:
@@ -92,17 +92,17 @@ def temporary_folder(prefix: str) -> Path:
 def check_above(folder: Path) -> None:
     """Raises `UnsafeFolderError` if another user can write or exchange a resolved folder.
 
-    The folders above it count as well. In a sticky folder such as /tmp nobody exchanges what
+    The folders above it count as well. In a sticky folder such as /tmp no other user exchanges what
     others own. The owner of the root folder is trusted, and so is the group that has the user's
     own number, which has no other members.
     """
     trusted = {os.getuid(), 0, os.stat("/").st_uid}
-    for place in (folder, *folder.parents):
-        found = place.stat()
+    for directory in (folder, *folder.parents):
+        found = directory.stat()
         if found.st_uid not in trusted:
-            raise UnsafeFolderError(f"{place} belongs to another user")
+            raise UnsafeFolderError(f"{directory} belongs to another user")
         if _others_write(found) and not found.st_mode & stat.S_ISVTX:
-            raise UnsafeFolderError(f"other users can write {place}")
+            raise UnsafeFolderError(f"other users can write {directory}")
 
 
 def check_own_file(path: Path) -> None:

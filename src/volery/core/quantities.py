@@ -18,14 +18,14 @@ class Quantity(NamedTuple):
     """Limits of the numbers of a quantity."""
 
     unit: str
-    most: float
+    maximum: float
     """Maximum magnitude."""
-    least: float = 0.0
+    smallest: float = 0.0
     """Minimum above 0 for a key that must be positive, because the value may be a divisor."""
     others: Mapping[str, float] = {}
     """Units that are often confused with this one, as factors of it."""
     low: float | None = None
-    """Minimum; None: `-most`."""
+    """Minimum; None: `-maximum`."""
 
 
 _LARGEST_INT = 2**63
@@ -65,41 +65,41 @@ def fault_in(
     """
     known = quantity_of(key, special)
     quantity = known or _NUMBER
-    for place, number in _numbers(value, ""):
+    for where, number in _numbers(value, ""):
         if isinstance(number, int):
             if abs(number) > _LARGEST_INT:
-                return f"{place}an integer of {number.bit_length()} bits; at most 64 are allowed"
+                return f"{where}an integer of {number.bit_length()} bits; at most 64 are allowed"
             if known is None:
                 continue  # counts and seeds have limits of their own
         elif not math.isfinite(number):
-            return f"{place}{number} is not finite"
-        tiny = (positive or low == 0.0) and 0 < number < quantity.least
+            return f"{where}{number} is not finite"
+        tiny = (positive or low == 0.0) and 0 < number < quantity.smallest
         below = quantity.low is not None and number < quantity.low
-        if tiny or below or abs(number) > quantity.most:
-            least = quantity.least if positive or tiny else quantity.low if low is None else low
-            return place + _beyond(number, quantity, least)
+        if tiny or below or abs(number) > quantity.maximum:
+            lowest = quantity.smallest if positive or tiny else quantity.low if low is None else low
+            return where + _beyond(number, quantity, lowest)
     return None
 
 
-def _numbers(value: Any, place: str) -> Iterator[tuple[str, int | float]]:
+def _numbers(value: Any, where: str) -> Iterator[tuple[str, int | float]]:
     """Yields the numbers of a value, each with a text for its position."""
     if isinstance(value, bool):
         return
     if isinstance(value, int | float):
-        yield (f"entry {place}: " if place else ""), value
+        yield (f"entry {where}: " if where else ""), value
     elif isinstance(value, list | tuple):
         for k, item in enumerate(value):
-            yield from _numbers(item, f"{place}[{k}]")
+            yield from _numbers(item, f"{where}[{k}]")
     elif isinstance(value, dict):
         for name, item in value.items():
-            yield from _numbers(item, f"{place}.{name}" if place else str(name))
+            yield from _numbers(item, f"{where}.{name}" if where else str(name))
 
 
 def _beyond(number: float, quantity: Quantity, low: float | None) -> str:
     unit = f" {quantity.unit}" if quantity.unit else ""
-    least = -quantity.most if low is None else low
-    told = f"{number:g}{unit} is beyond {least:g} to {quantity.most:g}{unit}"
+    lowest = -quantity.maximum if low is None else low
+    text = f"{number:g}{unit} is beyond {lowest:g} to {quantity.maximum:g}{unit}"
     for other, factor in quantity.others.items():
-        if abs(number) > quantity.most >= abs(number) * factor:
-            return f"{told}; given in {other}?"
-    return told
+        if abs(number) > quantity.maximum >= abs(number) * factor:
+            return f"{text}; given in {other}?"
+    return text

@@ -137,8 +137,8 @@ def exponential(rotation_vector: ArrayLike) -> Array:
     if v.ndim == 1:
         x, y, z = v.tolist()
         half = 0.5 * math.sqrt(x * x + y * y + z * z)
-        share = 0.5 * float(np.sinc(half / np.pi))
-        return np.array([x * share, y * share, z * share, float(np.cos(half))])
+        factor = 0.5 * float(np.sinc(half / np.pi))
+        return np.array([x * factor, y * factor, z * factor, float(np.cos(half))])
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
     half = angle / 2.0
     # sin(a/2)/a without a division by zero: numpy's sinc is sin(pi x)/(pi x)

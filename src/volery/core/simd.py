@@ -38,7 +38,7 @@ _SIGNATURE: Any = signature
 _FLOAT, _INDEX = _TYPES.float64, _TYPES.intp
 _NUMBER = ir.DoubleType()
 _VECTOR = ir.VectorType(_NUMBER, LANES)
-_PLACE = ir.IntType(32)
+_INDEX_TYPE = ir.IntType(32)
 
 
 class _LanesType(_TYPES.Type):  # type: ignore[misc]
@@ -63,7 +63,7 @@ def _word(function: Callable[..., Any]) -> Any:
 
 
 def _shuffled(builder: Any, a: Any, b: Any, order: tuple[int, ...]) -> Any:
-    mask = ir.Constant(ir.VectorType(_PLACE, len(order)), list(order))
+    mask = ir.Constant(ir.VectorType(_INDEX_TYPE, len(order)), list(order))
     return builder.shuffle_vector(a, b, mask)
 
 
@@ -72,7 +72,7 @@ def _spread(builder: Any, value: Any, kind: Any) -> Any:
     if kind == _LANES:
         return value
     nothing = ir.Constant(_VECTOR, ir.Undefined)
-    first = builder.insert_element(nothing, value, ir.Constant(_PLACE, 0))
+    first = builder.insert_element(nothing, value, ir.Constant(_INDEX_TYPE, 0))
     return _shuffled(builder, first, nothing, (0,) * LANES)
 
 
@@ -101,7 +101,7 @@ for _operation, _instruction in (
     _teach(getattr(operator, f"i{_operation.__name__}"), _instruction)
 
 
-def _place_of(context: Any, builder: Any, kind: Any, array: Any, first: Any) -> Any:
+def _address_of(context: Any, builder: Any, kind: Any, array: Any, first: Any) -> Any:
     view = _CGUTILS.create_struct_proxy(kind)(context, builder, array)
     return builder.bitcast(builder.gep(view.data, [first]), _VECTOR.as_pointer())
 
@@ -111,7 +111,7 @@ def lanes_at(_typing: Any, array: Any, first: Any) -> Any:
     """Returns elements of a contiguous float64 array, from index `first`."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        return builder.load(_place_of(context, builder, sig.args[0], *arguments), align=8)
+        return builder.load(_address_of(context, builder, sig.args[0], *arguments), align=8)
 
     return _LANES(array, _INDEX), generate
 
@@ -122,7 +122,7 @@ def put_lanes(_typing: Any, array: Any, first: Any, lanes: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         array, first, lanes = arguments
-        builder.store(lanes, _place_of(context, builder, sig.args[0], array, first), align=8)
+        builder.store(lanes, _address_of(context, builder, sig.args[0], array, first), align=8)
         return context.get_dummy_value()
 
     return _TYPES.void(array, _INDEX, _LANES), generate
@@ -185,16 +185,16 @@ def where_negative(_typing: Any, lanes: Any, then: Any, other: Any) -> Any:
 
 
 @_word
-def any_outside(_typing: Any, lanes: Any, least: Any, most: Any) -> Any:
-    """Returns whether any number is below `least` (lanes) or above `most` (one number).
+def any_outside(_typing: Any, lanes: Any, low: Any, high: Any) -> Any:
+    """Returns whether any number is below `low` (lanes) or above `high` (one number).
 
     NaN counts as outside.
     """
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
-        lanes, least, most = arguments
-        below = builder.fcmp_unordered("<", lanes, least)
-        above = builder.fcmp_unordered(">", lanes, _spread(builder, most, _FLOAT))
+        lanes, low, high = arguments
+        below = builder.fcmp_unordered("<", lanes, low)
+        above = builder.fcmp_unordered(">", lanes, _spread(builder, high, _FLOAT))
         bits = builder.bitcast(builder.or_(below, above), ir.IntType(LANES))
         return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
@@ -209,7 +209,7 @@ def totals(_typing: Any, a: Any, b: Any) -> Any:
         a, b = arguments
         left, right = (_shuffled(builder, a, b, order) for order in ((0, 2), (1, 3)))
         sums = builder.fadd(left, right)
-        numbers = [builder.extract_element(sums, ir.Constant(_PLACE, k)) for k in range(2)]
+        numbers = [builder.extract_element(sums, ir.Constant(_INDEX_TYPE, k)) for k in range(2)]
         return context.make_tuple(builder, sig.return_type, numbers)
 
     return _TYPES.UniTuple(_FLOAT, 2)(_LANES, _LANES), generate

@@ -10,10 +10,10 @@ import re
 import tomllib
 from typing import Any
 
-MOST_PARTS = 50
+MAX_PARTS = 50
 """Max number of parts of a dotted key, such as 3 of `world.terrain.kind`."""
 _PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-_TOO_LONG = re.compile(rf"(?<![A-Za-z0-9_.\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
+_TOO_LONG = re.compile(rf"(?<![A-Za-z0-9_.\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_PARTS}}}")
 
 
 _LINE = re.compile(r"line (\d+)")
@@ -41,7 +41,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     if found is not None:
         line = text.count("\n", 0, found.start()) + 1
         raise tomllib.TOMLDecodeError(
-            f"a key of more than {MOST_PARTS} parts (at line {line}); it is nested too deep"
+            f"a key of more than {MAX_PARTS} parts (at line {line}); it is nested too deep"
         )
     try:
         return tomllib.loads(text)

@@ -49,7 +49,7 @@ def whole_file(
     durable
         Wait until the content is on the disk, so that it survives a power failure.
     private
-        Let nobody but this user read or write the file.
+        Allow only this user to read or write the file.
 
     Raises
     ------

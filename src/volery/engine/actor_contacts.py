@@ -21,13 +21,13 @@ from volery.world.actors import MovingActors
 from volery.world.scene import Scene, Solid
 from volery.world.scene_content import BodyShape
 
-_LEAST_GAP_M = 1e-3
+_MIN_GAP_M = 1e-3
 """In contact, check again after each millimetre."""
 _RELEASE_M = 0.02
 """Gap beyond which a contact has ended, so that another contact is a new event."""
 _NEAR_LOOK_NS = 10_000_000
 _LONGEST_WAIT_S = 1000.0
-_FARTHEST_LOOK_M = 10.0
+_MAX_LOOK_M = 10.0
 """More than the size of any UAV."""
 
 Touch = Callable[[int, int, Array, bool, int], None]
@@ -39,20 +39,22 @@ class ActorShapes:
 
     def __init__(self, actors: MovingActors) -> None:
         self.actors = actors
-        self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in actors.shapes]
+        self._max_distance_m = [2.0 * shape.radius + _MAX_LOOK_M for shape in actors.shapes]
         by_shape: dict[int, Scene] = {}
         for shape in actors.shapes:
             if id(shape) not in by_shape:
                 by_shape[id(shape)] = _alone(shape)
         self._scenes = [by_shape[id(shape)] for shape in actors.shapes]
 
-    def from_place(self, k: int, pose: Array, place: Array) -> tuple[Array, float]:
-        """Returns vector (3,) m and distance m from actor `k` at `pose` (7,) to `place` (3,), map.
+    def from_position(self, k: int, pose: Array, position: Array) -> tuple[Array, float]:
+        """Returns vector (3,) m and distance m from actor `k` at `pose` (7,) to a position (3,).
 
         Inside, the distance is negative, and the vector points to the nearest surface.
         """
-        point = rotations.rotate(rotations.conjugate(pose[3:]), place - pose[:3])
-        found = self._scenes[k].clearance(point[None], self._reach[k], include_terrain=False)
+        point = rotations.rotate(rotations.conjugate(pose[3:]), position - pose[:3])
+        found = self._scenes[k].clearance(
+            point[None], self._max_distance_m[k], include_terrain=False
+        )
         distance = float(found.distance[0])
         away = (point - found.nearest[0]) * (-1.0 if distance < 0.0 else 1.0)
         return rotations.rotate(pose[3:], away), distance
@@ -73,8 +75,8 @@ class ActorContacts:
         self._looks = looks
         self._touch = touch
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
-        reach = np.array([shape.radius for shape in actors.shapes])
-        self._reach = np.where(actors.is_flat, -np.inf, reach)
+        radii = np.array([shape.radius for shape in actors.shapes])
+        self._radii_m = np.where(actors.is_flat, -np.inf, radii)
         self._touching = np.zeros((len(self._radius), len(actors)), dtype=bool)
         self._next_ns = np.zeros(len(self._radius), dtype=np.int64)
         """Time of the latest next check of each UAV, ns."""
@@ -96,7 +98,7 @@ class ActorContacts:
         state = self._fleet.state
         for i in rows.tolist():
             gaps, is_near = self._look_around(i, poses, time_ns)
-            half = np.maximum(0.5 * gaps, 0.5 * _LEAST_GAP_M)
+            half = np.maximum(0.5 * gaps, 0.5 * _MIN_GAP_M)
             state.separation_budget[i] = min(state.separation_budget[i], float(half.min()))
             self._next_ns[i] = time_ns + self._wait_ns(half, speeds, is_near)
 
@@ -129,12 +131,12 @@ class ActorContacts:
 
         The second value is whether the UAV is within the bounding sphere of an actor.
         """
-        place, radius = self._fleet.state.position_map[i], float(self._radius[i])
-        apart = np.linalg.norm(place - poses[:, :3], axis=1)
-        gaps = apart - self._reach - radius
+        position, radius = self._fleet.state.position_map[i], float(self._radius[i])
+        apart = np.linalg.norm(position - poses[:, :3], axis=1)
+        gaps = apart - self._radii_m - radius
         near = np.flatnonzero(gaps <= 0.0).tolist()
         for k in near:
-            away, distance = self._looks.from_place(k, poses[k], place)
+            away, distance = self._looks.from_position(k, poses[k], position)
             gaps[k] = distance - radius
             if gaps[k] <= 0.0:
                 is_new = not self._touching[i, k]

@@ -41,8 +41,8 @@ class CallBudget:
         for left, (client, owed_s) in enumerate(
             sorted(self._owed_s.items(), key=lambda item: item[1]), start=-len(self._owed_s)
         ):
-            share_s = earned_s / -left  # unused shares go to the others
-            paid_s = min(share_s, owed_s)
+            part_s = earned_s / -left  # unused shares go to the others
+            paid_s = min(part_s, owed_s)
             earned_s -= paid_s
             if paid_s == owed_s:
                 del self._owed_s[client]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
-from volery.control.fused_step import reach_m
+from volery.control.fused_step import travel_m
 from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
@@ -26,9 +26,9 @@ from volery.engine.actor_contacts import ActorContacts, ActorShapes
 from volery.engine.events import Event, EventKind
 from volery.world.scene import Clearance, Scene
 
-_LOOK_REACH_M = 8.0
+_MAX_LOOK_M = 8.0
 """Maximum distance of a query, which is repeated after that distance."""
-_LEAST_BUDGET_M = 1e-3
+_MIN_BUDGET_M = 1e-3
 """In contact, query again after each millimetre."""
 _RELEASE_M = 0.02
 """Gap beyond which a contact has ended, so that another contact is a new event."""
@@ -113,7 +113,7 @@ class Collisions:
             if gaps.min() <= 0.0:
                 return False
             self._touched_solid[rows[gaps > _RELEASE_M]] = -1
-            state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+            state.contact_budget[rows] = np.maximum(gaps, _MIN_BUDGET_M)
         return self._share_gaps(self._due(state.separation_budget))
 
     def _due(self, budget: Array) -> NDArray[np.int64]:
@@ -205,12 +205,12 @@ class Collisions:
                 away = -away
             self._touch_solid(i, away, int(found.instance[k]), time_ns)
         self._touched_solid[rows[gaps > _RELEASE_M]] = -1
-        state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+        state.contact_budget[rows] = np.maximum(gaps, _MIN_BUDGET_M)
 
     def _query(self, rows: NDArray[np.int64]) -> Clearance:
         """Returns the nearest points of trees and solids to the UAVs `rows`."""
         position = self._fleet.state.position_map[rows]
-        return self._scene.clearance(position, _LOOK_REACH_M, include_terrain=False, uavs=rows)
+        return self._scene.clearance(position, _MAX_LOOK_M, include_terrain=False, uavs=rows)
 
     def _touch_solid(self, i: int, away: Array, instance: int, time_ns: int) -> None:
         normal = _unit(away)
@@ -237,7 +237,7 @@ class Collisions:
         touching = self._touching_uav[env]
         touching[own, released] = False
         touching[released, own] = False
-        half = np.maximum(0.5 * gaps, 0.5 * _LEAST_BUDGET_M)
+        half = np.maximum(0.5 * gaps, 0.5 * _MIN_BUDGET_M)
         budget = state.separation_budget[env]
         others = np.arange(len(gaps)) != own
         budget[others] = np.minimum(budget[others], half[others])
@@ -305,7 +305,7 @@ def _share_gaps(
     Returns whether none of them is in contact; nothing changes otherwise. position: (N, 3) m;
     radius: (N,) m; touching: (N, uavs_per_env) pairs in contact; budget: (N,) m.
     """
-    for shares in (False, True):
+    for is_sharing in (False, True):
         for i in rows:
             first = i - i % uavs_per_env
             nearest = np.inf
@@ -317,16 +317,16 @@ def _share_gaps(
                 y = position[i, 1] - position[j, 1]
                 z = position[i, 2] - position[j, 2]
                 gap = np.sqrt(x * x + y * y + z * z) - radius[j] - radius[i]
-                if not shares:
+                if not is_sharing:
                     if gap <= 0.0:
                         return False
                     continue
                 if gap > _RELEASE_M and touching[i, own]:
                     touching[i, own] = touching[j, i - first] = False
-                half = max(0.5 * gap, 0.5 * _LEAST_BUDGET_M)
+                half = max(0.5 * gap, 0.5 * _MIN_BUDGET_M)
                 budget[j] = min(budget[j], half)
                 nearest = min(nearest, half)
-            if shares:
+            if is_sharing:
                 budget[i] = nearest
     return True
 
@@ -336,7 +336,7 @@ def _rows_due(budget: Any, velocity: Any, asleep: Any, seconds: float) -> Any:
     """Returns the rows of budgets (N,) m that are used up or may be so in `seconds`, if above 0."""
     found, rows = 0, np.empty(len(budget), np.int64)
     for i in range(len(budget)):
-        limit = reach_m(velocity[i], seconds) if seconds > 0.0 and not asleep[i] else 0.0
+        limit = travel_m(velocity[i], seconds) if seconds > 0.0 and not asleep[i] else 0.0
         if budget[i] <= limit:
             rows[found] = i
             found += 1

@@ -36,7 +36,7 @@ from volery.world.weather import Gust, Weather
 if TYPE_CHECKING:
     from volery.engine.estimation import Estimation
 
-_MOST_STEPS_A_TICK = 50
+_MAX_STEPS_PER_TICK = 50
 """The pose history holds 64 steps; its readers must not miss one."""
 
 
@@ -279,7 +279,7 @@ class Engine:
         now = self.fleet.step
         wanted = None if self.repeats is None else self.repeats.next_step()
         step = min(step, self._due_step(), step if wanted is None else wanted)
-        return min(max(step, now), now + _MOST_STEPS_A_TICK)
+        return min(max(step, now), now + _MAX_STEPS_PER_TICK)
 
     def note(self, uav: int, kind: EventKind, detail: str) -> None:
         """Adds an event of a UAV, at the current time."""

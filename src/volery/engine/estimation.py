@@ -144,7 +144,7 @@ class Estimation:
     def stand_still(self, uav: int, stamp_ns: int) -> None:
         """Passes zero velocity to the estimator of a UAV that is on the ground."""
         rows = self.rows_of(np.array([uav]))
-        self.estimator.fuse_velocity(rows, stamp_ns, np.zeros((1, 3)), _STANDING_VARIANCE)
+        self.estimator.fuse_velocity(rows, stamp_ns, np.zeros((1, 3)), _STATIONARY_VARIANCE)
 
     def restart(self, keys: Mapping[int, np.uint64]) -> None:
         """Restarts the estimates of restarted UAVs; `keys`: random stream by fleet row."""
@@ -195,7 +195,7 @@ class Estimation:
 
     def _take_fixes(self, samples: GnssSamples, selection: Rows | slice, rows: Rows) -> None:
         drift = self.setup.gnss_drift_variance[rows]
-        noise = np.maximum(_selected(samples.position_variance, selection) - drift, _LEAST_VARIANCE)
+        noise = np.maximum(_selected(samples.position_variance, selection) - drift, _MIN_VARIANCE)
         self.estimator.fuse_gnss(
             rows,
             samples.stamp_ns,
@@ -204,7 +204,7 @@ class Estimation:
             np.hstack(
                 [
                     noise,
-                    np.maximum(_selected(samples.velocity_variance, selection), _LEAST_VARIANCE),
+                    np.maximum(_selected(samples.velocity_variance, selection), _MIN_VARIANCE),
                 ]
             ),
             _selected(samples.has_fix, selection),
@@ -216,7 +216,7 @@ class Estimation:
         pressure = _selected(samples.pressure, selection)
         height = atmosphere.altitude(pressure) - self.setup.origin_altitude_m
         slope = atmosphere.altitude(pressure + 1.0) - atmosphere.altitude(pressure)
-        variance = np.maximum(slope**2 * samples.pressure_variance, _LEAST_VARIANCE)
+        variance = np.maximum(slope**2 * samples.pressure_variance, _MIN_VARIANCE)
         self.estimator.fuse_pressure_height(rows, samples.stamp_ns, height, variance)
 
     def _update_fleet(self, rows: Rows | None = None) -> None:
@@ -250,9 +250,9 @@ class Estimation:
 
 _NEVER_NS = -(10**18)
 
-_STANDING_VARIANCE = np.full(3, 0.02**2)
+_STATIONARY_VARIANCE = np.full(3, 0.02**2)
 """(m/s)^2, of a landed UAV in wind; modelling choice."""
-_LEAST_VARIANCE = 1e-4
+_MIN_VARIANCE = 1e-4
 """m^2 and (m/s)^2: no measurement is treated as better than a centimetre."""
 
 

@@ -162,17 +162,17 @@ class FaultPlan:
         """Clears the rotor faults and radio faults of a UAV that restarts."""
         if self._radios is not None:
             self._radios.restore_all(uav)
-        self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
+        self._weak = {key: fractions for key, fractions in self._weak.items() if key[0] != uav}
         self._active = tuple(one for one in self._active if uav_of(one.fault) != uav)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the active faults, for a snapshot; engine, fleet and sensors save the rest."""
-        weak = {key: list(shares) for key, shares in self._weak.items()}
+        weak = {key: list(fractions) for key, fractions in self._weak.items()}
         return {"weak": weak, "active": self._active}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state."""
-        self._weak = {key: list(shares) for key, shares in state["weak"].items()}
+        self._weak = {key: list(fractions) for key, fractions in state["weak"].items()}
         self._active = state["active"]
 
     @property
@@ -188,7 +188,7 @@ class FaultPlan:
         def act() -> None:
             if uav is not None and uav not in self._engine.names:
                 return
-            told = what
+            note = what
             try:
                 if not action():
                     return
@@ -196,10 +196,10 @@ class FaultPlan:
                 was_respawned = uav is not None and self._enlisted[uav] >= planned
                 if not client and not was_respawned:
                     raise
-                told = f"{what} is not possible: {error}"
-                _log.warning("%s (%s)", told, f"requested by {client}" if client else "planned")
+                note = f"{what} is not possible: {error}"
+                _log.warning("%s (%s)", note, f"requested by {client}" if client else "planned")
             if uav is not None:
-                self._engine.note(self._row(uav), EventKind.FAULT, told)
+                self._engine.note(self._row(uav), EventKind.FAULT, note)
 
         self._engine.at(ns_from_s(time_s), act)
 
@@ -238,9 +238,9 @@ class FaultPlan:
 
     def _set_health(self, key: tuple[str, int]) -> None:
         """Sets a rotor's health by the worst of its active faults."""
-        (uav, rotor), share = key, min(self._weak.get(key, ()), default=1.0)
+        (uav, rotor), fraction = key, min(self._weak.get(key, ()), default=1.0)
         sound = float(self._sound[uav][rotor])
-        self._fleet.set_rotor_health(self._row(uav), rotor, share * sound)
+        self._fleet.set_rotor_health(self._row(uav), rotor, fraction * sound)
 
     def _sensor(self, fault: SensorFault) -> _Actions:
         bank, row = self._find(fault.uav, fault.sensor)
@@ -316,25 +316,25 @@ class FaultPlan:
     def _displacement(self, fault: DisplacementFault) -> _Actions:
         self._row(fault.uav)
         if ns_from_s(fault.at_s) <= self._engine.time_ns:
-            self._check_displaced(fault)
+            self._check_displacement(fault)
         else:
-            checked("offset_m", fault.offset_m, (3,), self._longest_way_m())
+            checked("offset_m", fault.offset_m, (3,), self._max_displacement_m())
 
         def displace() -> None:
-            self._check_displaced(fault)
+            self._check_displacement(fault)
             self._fleet.displace(self._row(fault.uav), fault.offset_m)
 
         return displace, None
 
-    def _check_displaced(self, fault: DisplacementFault) -> None:
+    def _check_displacement(self, fault: DisplacementFault) -> None:
         """Raises `CommandError` if a UAV would be displaced out of the world or into a solid."""
         engine = self._engine
         there = self._fleet.state.position_map[self._row(fault.uav)] + fault.offset_m
         at = f"fault: {fault.uav} would be displaced to ({there[0]:g}, {there[1]:g}, {there[2]:g})"
         x0, y0, x1, y1 = engine.ground.bounds
         if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
-            reach = f"({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
-            raise CommandError(f"{at} m, beyond the terrain, which extends from {reach}")
+            extent = f"({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
+            raise CommandError(f"{at} m, beyond the terrain, which extends from {extent}")
         ground_m = float(engine.ground.height(there[0], there[1]))
         if there[2] < ground_m:
             raise CommandError(f"{at} m, under the ground, whose height is {ground_m:g} m there")
@@ -344,7 +344,7 @@ class FaultPlan:
         if around >= 0:
             raise CommandError(f"{at} m, inside {engine.scene.instance_name(around)}")
 
-    def _longest_way_m(self) -> float:
+    def _max_displacement_m(self) -> float:
         """Returns the maximum displacement along an axis inside the world, m."""
         x0, y0, x1, y1 = self._engine.ground.bounds
         return float(max(x1 - x0, y1 - y0, MAX_COORDINATE))

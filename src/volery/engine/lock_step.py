@@ -62,7 +62,7 @@ class Partner:
         self._is_there = is_there
         self._wake: Callable[[], None] = _nothing
         self._changed = threading.Condition()
-        self._meeting_ns: int | None = None
+        self._barrier_ns: int | None = None
         self._actions: tuple[Action, ...] | None = None
         self._left = False
 
@@ -80,19 +80,19 @@ class Partner:
         """
         with self._changed:
             came = self._changed.wait_for(
-                lambda: self._left or (self._meeting_ns is not None and self._actions is None),
+                lambda: self._left or (self._barrier_ns is not None and self._actions is None),
                 timeout_s,
             )
             if not came:
                 raise PartnerError(f"{self.name}: no barrier within {timeout_s} s of wall time")
-            return None if self._left else self._meeting_ns
+            return None if self._left else self._barrier_ns
 
     def reply(self, *actions: Action) -> None:
         """Ends the barrier, after the engine has called `actions` in its own thread, in order."""
         with self._changed:
             if self._left:
                 return
-            if self._meeting_ns is None or self._actions is not None:
+            if self._barrier_ns is None or self._actions is not None:
                 raise PartnerError(f"{self.name}: no barrier to reply to; call wait() first")
             self._actions = actions
             self._changed.notify_all()
@@ -111,7 +111,7 @@ class Partner:
         """Begins the barrier at `time_ns`; `wake` is called at its end."""
         with self._changed:
             self._wake = wake
-            self._meeting_ns, self._actions = time_ns, None
+            self._barrier_ns, self._actions = time_ns, None
             self._changed.notify_all()
         if self._on_meeting is not None:
             self._on_meeting(time_ns)
@@ -130,17 +130,17 @@ class Partner:
         """
         with self._changed:
             came = self.answered
-            meeting_ns, self._meeting_ns = self._meeting_ns, None
+            barrier_ns, self._barrier_ns = self._barrier_ns, None
             actions, self._actions = self._actions or (), None
             if came:
                 return actions
             self._left = True
             self._changed.notify_all()
-        if self._on_timeout == "leave" or meeting_ns is None:
+        if self._on_timeout == "leave" or barrier_ns is None:
             return ()
         raise PartnerError(
             f"partner '{self.name}' did not answer within {self.timeout_s} s of wall time at "
-            f"{meeting_ns / 1e9:.3f} s"
+            f"{barrier_ns / 1e9:.3f} s"
         )
 
 

@@ -143,8 +143,8 @@ class Pacer:
         """Records that all or some steps of `next_steps` were run."""
         with self._changed:
             request, self._in_hand = self._in_hand, None
-            told = request is not None and self._steps.count(request, steps)
-        if request is not None and told:
+            is_counted = request is not None and self._steps.count(request, steps)
+        if request is not None and is_counted:
             request.notify()
 
     def wait(self, time_ns: int) -> bool:

@@ -87,12 +87,12 @@ class StateCheck:
         dt = fleet.dt_ns * 1e-9
         speed = max(self._fastest(row), fleet.airframes[row].limits.speed_m_s)
         terms = terms_of(fleet.airframes[row], fleet.plants[row], dt, speed)
-        if terms and terms[0].share > _NOTABLE:
+        if terms and terms[0].fraction > _NOTABLE:
             worst = terms[0]
             return (
-                f"the likely cause is {worst.key} of {worst.owner}, which takes {worst.share:.3g} "
-                f"of its motion in each step of {1e3 * dt:g} ms at {speed:.3g} m/s; less than 1 is "
-                "stable"
+                f"the likely cause is {worst.key} of {worst.owner}, which takes "
+                f"{worst.fraction:.3g} of its motion in each step of {1e3 * dt:g} ms at "
+                f"{speed:.3g} m/s; less than 1 is stable"
             )
         return (
             "no term of its model is too stiff for the physics step; check its commands, faults, "
@@ -105,8 +105,8 @@ class StateCheck:
         newest = step % len(history)
         path = np.roll(history[:, row], -newest - 1, axis=0)
         with np.errstate(all="ignore"):
-            way = np.linalg.norm(np.diff(path, axis=0), axis=1)
-        speed = way / (self._fleet.dt_ns * 1e-9)
+            distances = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        speed = distances / (self._fleet.dt_ns * 1e-9)
         return float(speed[speed <= MAX_SPEED_M_S].max(initial=0.0))
 
 

@@ -39,13 +39,13 @@ def speed_chart(flight: FlightData) -> str:
 
 def clearance_chart(flight: FlightData) -> str:
     """Draws the distance to the nearest tree or solid over time, up to the searched range."""
-    reach = flight.clearance_reach_m
+    max_clearance_m = flight.max_clearance_m
     return _over_time(
         flight,
-        lambda uav: np.minimum(uav.clearance_m, reach),
+        lambda uav: np.minimum(uav.clearance_m, max_clearance_m),
         "distance to the nearest obstacle, m",
         floor=0.0,
-        ceiling=reach * 1.03,
+        ceiling=max_clearance_m * 1.03,
         lowest=True,
     )
 

@@ -132,7 +132,7 @@ class FlightData:
     events: tuple[FlightEvent, ...] = ()
     stage_seconds: Mapping[str, float] = field(default_factory=dict)
     """Wall seconds spent in each stage of the engine."""
-    clearance_reach_m: float = 10.0
+    max_clearance_m: float = 10.0
     digest: str = ""
     interrupted: str = ""
     """Why the flight ended early; empty if it did not."""

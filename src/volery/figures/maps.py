@@ -152,8 +152,8 @@ def _frame(flight: FlightData, margin_m: float) -> Box:
     size = np.maximum(size, (_ASPECT * size[1], 0.45 * size[0]))
     # inside the world if it is large enough, else around the paths
     world_low, world_high = np.array([x0, y0]), np.array([x1, y1])
-    least = flown.max(axis=0) - flown.min(axis=0) + 10.0
-    size = np.maximum(np.minimum(size, world_high - world_low), least)
+    min_size = flown.max(axis=0) - flown.min(axis=0) + 10.0
+    size = np.maximum(np.minimum(size, world_high - world_low), min_size)
     middle = (low + high) / 2.0
     low = np.clip(middle - size / 2.0, world_low, np.maximum(world_high - size, world_low))
     low = np.clip(low, flown.max(axis=0) + 5.0 - size, flown.min(axis=0) - 5.0)

@@ -52,7 +52,8 @@ class Grade:
             for verdict in flight.verdicts:
                 passed[verdict.name] += verdict.is_passed
         return {
-            name: most * passed[name] / len(self.flights) for name, most in self.max_points.items()
+            name: maximum * passed[name] / len(self.flights)
+            for name, maximum in self.max_points.items()
         }
 
     @property

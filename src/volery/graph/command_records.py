@@ -29,7 +29,7 @@ _INLINE_BYTES = 4096
 """A message with more bytes in arrays and texts follows its record (modelling choice)."""
 _ITEMS_SHOWN = 16
 _CHARACTERS_SHOWN = 400
-_MOST_CHARACTERS = 8000
+_MAX_CHARACTERS = 8000
 """Limit of the JSON text."""
 
 _PARTS = {
@@ -45,20 +45,20 @@ def content_type(kind: str, name: str) -> str:
     return name + _PARTS.get(kind, "")
 
 
-def is_large(taken: ClientCommand) -> bool:
+def is_large(command: ClientCommand) -> bool:
     """Returns whether a command is a published message too large for its record."""
-    if taken.kind != "publish" or not _grows(taken.type):
+    if command.kind != "publish" or not _grows(command.type):
         return False
-    return array_bytes(taken.content) > _INLINE_BYTES
+    return array_bytes(command.content) > _INLINE_BYTES
 
 
-def content_bytes(taken: ClientCommand) -> bytes:
+def content_bytes(command: ClientCommand) -> bytes:
     """Encodes the content of a command. Raises `GraphError` if it does not fit its type."""
-    if taken.content is None:
+    if command.content is None:
         return b""
-    if isinstance(taken.content, str):
-        return taken.content.encode()
-    return encode_cdr(taken.content, content_type(taken.kind, taken.type))
+    if isinstance(command.content, str):
+        return command.content.encode()
+    return encode_cdr(command.content, content_type(command.kind, command.type))
 
 
 def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
@@ -71,7 +71,7 @@ def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
 
 
 def record_of(
-    taken: ClientCommand, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
+    command: ClientCommand, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
 ) -> Any:
     """Returns the record of a command; `cdr` is from `content_bytes`, None: it follows."""
     return message_type(TYPE)(
@@ -79,27 +79,27 @@ def record_of(
         number=number,
         step=step,
         turn=turn,
-        client=taken.client,
-        kind=taken.kind,
-        name=taken.name,
-        type=taken.type,
-        content=_for_people(taken),
+        client=command.client,
+        kind=command.kind,
+        name=command.name,
+        type=command.type,
+        content=_for_people(command),
         cdr=np.frombuffer(cdr or b"", np.uint8),
         follows=cdr is None,
-        latched=taken.latched,
-        request=taken.request,
+        latched=command.latched,
+        request=command.request,
     )
 
 
-def _for_people(taken: ClientCommand) -> str:
-    if taken.content is None:
+def _for_people(command: ClientCommand) -> str:
+    if command.content is None:
         return ""
-    if isinstance(taken.content, str):
-        return taken.content
-    plain = _form().encode(taken.content, content_type(taken.kind, taken.type))
+    if isinstance(command.content, str):
+        return command.content
+    plain = _form().encode(command.content, content_type(command.kind, command.type))
     text = json.dumps(_shortened(plain), ensure_ascii=False)
-    if len(text) > _MOST_CHARACTERS:
-        text = json.dumps({"shortened": text[:_MOST_CHARACTERS]}, ensure_ascii=False)
+    if len(text) > _MAX_CHARACTERS:
+        text = json.dumps({"shortened": text[:_MAX_CHARACTERS]}, ensure_ascii=False)
     return text
 
 

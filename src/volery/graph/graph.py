@@ -39,7 +39,7 @@ AsyncHandler = Callable[[Any, ServiceReply], None]
 
 _log = logging.getLogger(__name__)
 
-MOST_UNUSED = 1000
+MAX_UNUSED = 1000
 """Maximum number of topics stored without publisher or subscriber."""
 
 
@@ -387,7 +387,7 @@ class Graph:
                     )
 
     def refuse(self, topic: str, reason: str) -> None:
-        """Tells the client that caused the message being delivered why it is not obeyed.
+        """Reports to the client that caused the delivered message why it is refused.
 
         Has no effect for messages of the simulation's own nodes. In the simulation's thread.
         """
@@ -440,7 +440,7 @@ class Graph:
             self._queue.extend(reversed(after))
 
     def _drop_unused(self, topic: Topic) -> None:
-        """Removes the oldest unused topic when there are more than MOST_UNUSED."""
+        """Removes the oldest unused topic when there are more than MAX_UNUSED."""
         with self._members:
             self.changes += 1
             if topic.used:
@@ -454,7 +454,7 @@ class Graph:
                 self._drop_expected(others[0])
                 return
             self._unused[topic.name] = topic
-            if len(self._unused) > MOST_UNUSED:
+            if len(self._unused) > MAX_UNUSED:
                 oldest = self._unused.pop(next(iter(self._unused)))
                 if not oldest.used:
                     del self._topics[oldest.name]

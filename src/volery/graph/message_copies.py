@@ -27,7 +27,7 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
 from volery.graph.lazy_list import LazyList
 from volery.graph.message_defaults import is_plain_name
-from volery.graph.message_numbers import MOST_FLOAT32, numbers_of, with_sign
+from volery.graph.message_numbers import MAX_FLOAT32, numbers_of, with_sign
 from volery.graph.number_sequence import received
 from volery.graph.octet import Octet
 from volery.graph.typestore import typestore
@@ -69,7 +69,7 @@ _CHECKED, _RECEIVED, _LOOKED_AT = _Purpose
 _OTHER_TYPE, _NO_FIELD = _OF_MESSAGES = ("must be a message of type", "has no field")
 """What errors say about a message as a whole, after its type or path."""
 _USUAL = {
-    "float32": f"float and -{MOST_FLOAT32} <= v <= {MOST_FLOAT32}",
+    "float32": f"float and -{MAX_FLOAT32} <= v <= {MAX_FLOAT32}",
     "float64": "float",
     "string": "str and v.isascii()",  # other text may have half a surrogate pair
     "bool": "bool",
@@ -104,8 +104,8 @@ def _copier(msgtype: str, purpose: _Purpose) -> Copy:
             if usual is None
             else f"(v if (v := message.{name}).__class__ is {usual} else _copy_{name}(v))"
         )
-    most = len(described)
-    is_odd = f"message.__class__ is not _cls or len(message.__dict__) > {most}"
+    num_fields = len(described)
+    is_odd = f"message.__class__ is not _cls or len(message.__dict__) > {num_fields}"
     check = "" if purpose is _RECEIVED else f"    if {is_odd}: _check(message)\n"
     listed = ", ".join(values)
     made = f"[{listed}]" if purpose is _LOOKED_AT else f"_cls({listed})"
@@ -188,8 +188,8 @@ def _check_value(
 
 def _check_float32(where: str, is_number: Copy, value: Any) -> Any:
     is_number(value)
-    if MOST_FLOAT32 < abs(value) < math.inf:
-        raise GraphError(f"{where} must be a float32, at most {MOST_FLOAT32:.7g}, not {value}")
+    if MAX_FLOAT32 < abs(value) < math.inf:
+        raise GraphError(f"{where} must be a float32, at most {MAX_FLOAT32:.7g}, not {value}")
     return value
 
 
@@ -223,8 +223,10 @@ def _nested(where: str, msgtype: str, copy: Copy, value: Any) -> Any:
 
 def _error_inside(where: str, msgtype: str, error: GraphError) -> GraphError:
     """Returns the error of a nested message, with the path of its field: `pose.position.x`."""
-    told = str(error).removeprefix(f"{msgtype}: ")
-    return GraphError(f"{where} {told}" if told.startswith(_OF_MESSAGES) else f"{where}.{told}")
+    reason = str(error).removeprefix(f"{msgtype}: ")
+    return GraphError(
+        f"{where} {reason}" if reason.startswith(_OF_MESSAGES) else f"{where}.{reason}"
+    )
 
 
 def _writeable(values: Any) -> Any:

@@ -25,7 +25,7 @@ _CLASSES: dict[str, tuple[type, ...]] = {
 }
 
 
-MOST_FLOAT32 = 3.4028235677973362e38
+MAX_FLOAT32 = 3.4028235677973362e38
 """Largest number that rounds to a float32; rclpy refuses larger ones, too."""
 
 
@@ -96,9 +96,9 @@ def _array_of_list(where: str, dtype: np.dtype[Any], values: list[Any]) -> NDArr
         return np.frombuffer(b"".join(values), np.uint8)
     classes = _CLASSES[dtype.kind]
     if not all(issubclass(kind, classes) for kind in set(map(type, values))):
-        place, odd = next((k, v) for k, v in enumerate(values) if not isinstance(v, classes))
+        index, odd = next((k, v) for k, v in enumerate(values) if not isinstance(v, classes))
         raise GraphError(
-            f"{where}[{place}] must be a number of {dtype}, not {odd!r:.80} ({type(odd).__name__})"
+            f"{where}[{index}] must be a number of {dtype}, not {odd!r:.80} ({type(odd).__name__})"
         )
     try:
         kind = {"f": np.float64, "b": np.bool_}.get(dtype.kind)
@@ -109,13 +109,13 @@ def _array_of_list(where: str, dtype: np.dtype[Any], values: list[Any]) -> NDArr
 
 def _check_range(where: str, dtype: np.dtype[Any], values: NDArray[Any]) -> None:
     if dtype == np.float32 and values.dtype.kind == "f":
-        odd = values[(np.abs(values) > MOST_FLOAT32) & (np.abs(values) < np.inf)]
+        odd = values[(np.abs(values) > MAX_FLOAT32) & (np.abs(values) < np.inf)]
         if len(odd):
-            raise GraphError(f"{where} must be float32, at most {MOST_FLOAT32:.7g}, not {odd[0]}")
+            raise GraphError(f"{where} must be float32, at most {MAX_FLOAT32:.7g}, not {odd[0]}")
     if dtype.kind not in "iu" or not values.size:
         return
     limits = np.iinfo(dtype)
-    least, most = values.min(), values.max()
-    if least < limits.min or most > limits.max:
-        odd = least if least < limits.min else most
+    minimum, maximum = values.min(), values.max()
+    if minimum < limits.min or maximum > limits.max:
+        odd = minimum if minimum < limits.min else maximum
         raise GraphError(f"{where} must be {dtype}, {limits.min} to {limits.max}, not {odd}")

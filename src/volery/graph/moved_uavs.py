@@ -1,6 +1,6 @@
-"""States which UAVs a topic or service moves, where its name does not tell.
+"""States which UAVs a topic or service moves, where its name does not say.
 
-Whoever receives the messages or requests declares it: `/mavros/cmd/land` moves `uav1`.
+The receiver of the messages or requests declares it: `/mavros/cmd/land` moves `uav1`.
 """
 
 from __future__ import annotations

@@ -46,12 +46,12 @@ class NumberSequence(np.ndarray):
         return self.dtype.char
 
     def index(self, value: Any, start: int = 0, stop: int | None = None) -> int:
-        """Returns the first place of a value. Raises `ValueError` if there is none."""
+        """Returns the first index of a value. Raises `ValueError` if there is none."""
         begin = range(len(self))[start:stop].start
-        places = np.flatnonzero(_plain(self)[start:stop] == value)
-        if not len(places):
+        indices = np.flatnonzero(_plain(self)[start:stop] == value)
+        if not len(indices):
             raise ValueError(f"{value} is not in the sequence")
-        return int(places[0]) + begin
+        return int(indices[0]) + begin
 
     def count(self, value: Any) -> int:
         """Returns how often a value occurs."""

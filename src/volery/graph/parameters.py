@@ -218,11 +218,11 @@ class Parameter(ParameterSetting):
         if self._within is not None:
             whole = self.type_ is ParameterType.INTEGER
             kind = "IntegerRange" if whole else "FloatingPointRange"
-            least, most, step = self._within
-            if not whole or most < math.inf:
+            minimum, maximum, step = self._within
+            if not whole or maximum < math.inf:
                 number: Any = int if whole else float
                 bounds = message_type(f"rcl_interfaces/msg/{kind}")(
-                    from_value=number(least), to_value=number(most), step=number(step)
+                    from_value=number(minimum), to_value=number(maximum), step=number(step)
                 )
                 getattr(descriptor, "integer_range" if whole else "floating_point_range").append(
                     bounds

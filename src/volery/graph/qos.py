@@ -9,13 +9,13 @@ from typing import Any
 from volery.core.errors import GraphError
 
 DEFAULT_DEPTH = 10
-MOST_DEPTH = 100_000
+MAX_DEPTH = 100_000
 
 
 def check_depth(depth: int) -> None:
     """Raises `GraphError` if a depth is out of range."""
-    if not 1 <= depth <= MOST_DEPTH:
-        raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
+    if not 1 <= depth <= MAX_DEPTH:
+        raise GraphError(f"queue depth must be 1 to {MAX_DEPTH}, not {depth}")
 
 
 class _Policy(StrEnum):
@@ -155,7 +155,7 @@ class QoSProfile:
         self.durability = DurabilityPolicy(self.durability)
         self.history = HistoryPolicy(self.history)
         if self.history == HistoryPolicy.KEEP_ALL:
-            self.depth = MOST_DEPTH
+            self.depth = MAX_DEPTH
         self.depth = self.depth or DEFAULT_DEPTH
         check_depth(self.depth)
 

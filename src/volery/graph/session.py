@@ -52,11 +52,11 @@ _MAX_FAILURES_LOGGED = 20
 
 _REFUSAL_PERIOD_S = 1.0
 _MAX_REFUSALS = 20
-"""Different refusals told within that time."""
+"""Different refusals reported within that time."""
 
 MAX_LATCHED_BYTES = 128 * 1024 * 1024
 """Limit of the latched messages of one client, which the graph stores for late subscribers."""
-_MOST_NAMES = 20_000
+_MAX_NAMES = 20_000
 """Limit of the stored names of commanded UAVs; more than any fleet has."""
 
 
@@ -175,7 +175,7 @@ class Gateway:
             self.commands += 1
             self.commanded_ns.pop(uav, None)  # newest last
             self.commanded_ns[uav] = self.graph.now_ns()
-            if len(self.commanded_ns) > _MOST_NAMES:
+            if len(self.commanded_ns) > _MAX_NAMES:
                 del self.commanded_ns[next(iter(self.commanded_ns))]
 
     def _note_refused(self, refusal: Refusal) -> None:
@@ -184,8 +184,8 @@ class Gateway:
         with suppress(GraphError):  # the run has ended
             self.watch(ClientCommand(client, "refused", topic, msgtype, reason))
         with self._lock:
-            told = [session for session in self._sessions if session.name == client]
-        for session in told:
+            sessions = [session for session in self._sessions if session.name == client]
+        for session in sessions:
             session.report_refusal(topic, reason)
 
     def note_lost(self, messages: int) -> None:
@@ -227,9 +227,9 @@ class Session:
         self._failed: set[str] = set()
         self.on_refused: Callable[[str], None] | None = None
         """Receives why a message of the client is not obeyed, in the simulation's thread; must not
-        block. A bridge sets it where its protocol can tell the client."""
+        block. A bridge sets it where its protocol can name the client."""
         self._reported_s: dict[tuple[str, str], float] = {}
-        """Wall time of the last refusals that the client was told, s."""
+        """Wall time of the last refusals reported to the client, s."""
 
     @property
     def graph(self) -> Graph:

@@ -14,12 +14,12 @@ import numpy as np
 from volery.core.plurals import counted
 from volery.graph.lazy_list import LazyList
 from volery.graph.messages import Published
-from volery.graph.qos import MOST_DEPTH
+from volery.graph.qos import MAX_DEPTH
 
 Wake = Callable[[], None]
 """Called in the simulation's thread when messages are available; must not block."""
 
-MOST_RELIABLE_BYTES = 256 * 1024 * 1024
+MAX_RELIABLE_BYTES = 256 * 1024 * 1024
 """Limit of the bytes queued for a reliable subscriber; beyond, its subscription ends."""
 
 _PART_BYTES = 100
@@ -41,8 +41,8 @@ class SubscriptionQueueInfo:
 class SubscriptionQueue:
     """Queues messages of one topic for one client.
 
-    With best effort, the newest `depth` messages. A `reliable` queue drops none, up to MOST_DEPTH
-    messages or MOST_RELIABLE_BYTES: a client that is farther behind will never catch up, so the
+    With best effort, the newest `depth` messages. A `reliable` queue drops none, up to MAX_DEPTH
+    messages or MAX_RELIABLE_BYTES: a client that is farther behind will never catch up, so the
     queue then empties, accepts no more and gives the reason in `failure`.
     """
 
@@ -72,7 +72,7 @@ class SubscriptionQueue:
             was_empty = not self._waiting
             if self._reliable:
                 self._bytes += array_bytes(published.message)
-                if len(self._waiting) >= MOST_DEPTH or self._bytes > MOST_RELIABLE_BYTES:
+                if len(self._waiting) >= MAX_DEPTH or self._bytes > MAX_RELIABLE_BYTES:
                     self._give_up()
             elif len(self._waiting) >= self._depth:
                 self._waiting.popleft()
@@ -103,14 +103,14 @@ class SubscriptionQueue:
         self._waiting.clear()
         self._bytes = 0
 
-    def take(self, most: int | None = None) -> list[Published]:
-        """Removes and returns the queued messages, oldest first, at most `most`."""
-        return [published for _, published in self.take_numbered(most)]
+    def take(self, max_count: int | None = None) -> list[Published]:
+        """Removes and returns the queued messages, oldest first, at most `max_count`."""
+        return [published for _, published in self.take_numbered(max_count)]
 
-    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
+    def take_numbered(self, max_count: int | None = None) -> list[tuple[int, Published]]:
         """Like `take`, with numbers that give the order of arrival across all queues."""
         with self._lock:
-            count = len(self._waiting) if most is None else min(most, len(self._waiting))
+            count = len(self._waiting) if max_count is None else min(max_count, len(self._waiting))
             taken = [self._waiting.popleft() for _ in range(count)]
             if self._reliable:
                 self._bytes -= sum(array_bytes(published.message) for _, published in taken)

@@ -56,9 +56,9 @@ class Topic:
         return bool(self.publishers or len(self.callbacks) > len(self.external))
 
     def end(self, reason: str) -> None:
-        """Tells the external subscribers that they will receive no message."""
-        for tell in tuple(self.on_ended):
-            tell(reason)
+        """Notifies the external subscribers that they will receive no message."""
+        for on_end in tuple(self.on_ended):
+            on_end(reason)
 
 
 class _Delivery(Protocol):

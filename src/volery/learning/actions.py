@@ -222,5 +222,5 @@ class RotorSpeeds:
 def _thrust(flight: Flight, action: Array) -> Array:
     """Returns thrusts (K, n), N, of the last number of each action."""
     airframe = flight.airframe
-    most = airframe.max_rotor_thrust * len(airframe.rotors.places)
-    return action_terms.thrust(action[..., 3], airframe.weight, most)
+    max_thrust = airframe.max_rotor_thrust * len(airframe.rotors.places)
+    return action_terms.thrust(action[..., 3], airframe.weight, max_thrust)

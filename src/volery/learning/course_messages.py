@@ -104,7 +104,7 @@ def _max_lookahead_s(task: Task) -> float:
     return float(max(max(times) for times in ahead))
 
 
-def _pose(place: Array) -> Pose:
+def _pose(waypoint: Array) -> Pose:
     """Returns the pose of (x, y, z, yaw)."""
-    attitude = rotations.from_rpy(0.0, 0.0, math.remainder(float(place[3]), math.tau))
-    return Pose(Point(*place[:3].tolist()), Quaternion(*attitude.tolist()))
+    attitude = rotations.from_rpy(0.0, 0.0, math.remainder(float(waypoint[3]), math.tau))
+    return Pose(Point(*waypoint[:3].tolist()), Quaternion(*attitude.tolist()))

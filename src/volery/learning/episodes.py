@@ -143,9 +143,9 @@ class Episodes:
             task.advance(flight)
         reward = np.zeros((flight.num_envs, flight.num_uavs))
         for part in task.rewards:
-            share = part.weight * part.function(flight)
-            self.reward_sums[part.name] += share
-            reward += share
+            reward_part = part.weight * part.function(flight)
+            self.reward_sums[part.name] += reward_part
+            reward += reward_part
         terminated = np.zeros(flight.num_envs, np.bool_)
         success = np.zeros(flight.num_envs, np.bool_)
         end = np.full(flight.num_envs, -1)

@@ -61,10 +61,10 @@ def describe(
 def _action(action: Action, airframe: Airframe) -> ActionPart:
     parameters: dict[str, Any] = asdict(action)  # type: ignore[call-overload]  # a dataclass
     if action.kind in _LEVELS_BELOW_VELOCITY:
-        shares = hover_thrusts(airframe) / airframe.max_rotor_thrust
-        most = len(shares) * airframe.max_rotor_thrust
-        parameters["hover_thrust_fraction"] = airframe.weight / most
-        parameters["hover_speed_fractions"] = np.sqrt(shares).tolist()
+        fractions = hover_thrusts(airframe) / airframe.max_rotor_thrust
+        max_thrust = len(fractions) * airframe.max_rotor_thrust
+        parameters["hover_thrust_fraction"] = airframe.weight / max_thrust
+        parameters["hover_speed_fractions"] = np.sqrt(fractions).tolist()
     return ActionPart(
         kind=action.kind, size=action.size, choices=action.choices, parameters=parameters
     )

@@ -69,8 +69,10 @@ def straight_chase(flight: Flight) -> Array:
     state = flight.state
     pursuers = state.position_map[:, :PURSUERS]
     to_evader = state.position_map[:, EVADER:] - pursuers
-    way = to_evader / np.maximum(np.linalg.norm(to_evader, axis=-1, keepdims=True), 1e-6)
+    direction = to_evader / np.maximum(np.linalg.norm(to_evader, axis=-1, keepdims=True), 1e-6)
     apart = pursuers[:, :, None] - pursuers[:, None]
     distance = np.maximum(np.linalg.norm(apart, axis=-1, keepdims=True), 1e-6)
-    way = way + (2.0 * np.clip(1.0 - distance / 2.5, 0.0, 1.0) * apart / distance).sum(axis=2)
-    return observation_terms.to_heading(state.attitude[:, :PURSUERS], way)
+    direction = direction + (2.0 * np.clip(1.0 - distance / 2.5, 0.0, 1.0) * apart / distance).sum(
+        axis=2
+    )
+    return observation_terms.to_heading(state.attitude[:, :PURSUERS], direction)

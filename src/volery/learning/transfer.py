@@ -35,8 +35,8 @@ _SENSORS: tuple[dict[str, Any], ...] = (
     {"kind": "barometer"},
     {"kind": "magnetometer"},
 )
-"""RTK: with the drift of a receiver alone no policy, and no pilot, could find goals that are known
-by their coordinates to a fraction of a metre."""
+"""RTK: with the drift of a receiver alone no policy, and no operator, could find goals that are
+known by their coordinates to a fraction of a metre."""
 _ESTIMATE_HZ = 100.0
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 _SIZES = struct.Struct("<2I")
 _MAX_PIXELS = 1 << 26
-_MAX_PLACE = 10
+_MAX_HALF_BYTE = 10
 """Largest index of a half byte of a number of 32 bits."""
 
 
@@ -26,20 +26,20 @@ def decode_rvl(data: bytes) -> NDArray[np.uint16]:
         raise ValueError(f"an RVL image of {width} x {height} pixels is too large")
     pixels = np.zeros(width * height, np.uint16)
     values = _values(data[_SIZES.size :])
-    place = read = previous = 0
-    while place < len(pixels):
+    index = read = previous = 0
+    while index < len(pixels):
         if read + 2 > len(values):
             raise ValueError("the RVL data are cut off")
-        place += int(values[read])
+        index += int(values[read])
         count = int(values[read + 1])
         codes = values[read + 2 : read + 2 + count]
-        if place + count > len(pixels) or len(codes) < count:
+        if index + count > len(pixels) or len(codes) < count:
             raise ValueError("the RVL data do not fit the size of the image")
         if count:
             depths = previous + np.cumsum((codes >> 1) ^ -(codes & 1))
-            pixels[place : place + count] = depths & 0xFFFF
+            pixels[index : index + count] = depths & 0xFFFF
             previous = int(depths[-1])
-        place, read = place + count, read + 2 + count
+        index, read = index + count, read + 2 + count
     return pixels.reshape(height, width)
 
 
@@ -52,8 +52,8 @@ def _values(data: bytes) -> NDArray[np.int64]:
     if not len(ends):
         return np.zeros(0, np.int64)
     starts = np.concatenate([[0], ends[:-1] + 1])
-    place = np.arange(ends[-1] + 1) - np.repeat(starts, ends - starts + 1)
-    if place.max() > _MAX_PLACE:
+    index = np.arange(ends[-1] + 1) - np.repeat(starts, ends - starts + 1)
+    if index.max() > _MAX_HALF_BYTE:
         raise ValueError("the RVL data have a number of more than 32 bits")
-    parts = (halves[: ends[-1] + 1] & 7) << 3 * place
+    parts = (halves[: ends[-1] + 1] & 7) << 3 * index
     return np.add.reduceat(parts, starts)

@@ -48,12 +48,14 @@ class _Edge(NamedTuple):
         after = np.minimum(after, len(self.times_s) - 1)
         before = np.maximum(after - 1, 0)
         gap = self.times_s[after] - self.times_s[before]
-        share = np.where(gap > 0.0, (times_s - self.times_s[before]) / np.where(gap, gap, 1.0), 0.0)
-        share = share[:, None]
-        p = (1.0 - share) * self.poses[before, :3] + share * self.poses[after, :3]
+        fraction = np.where(
+            gap > 0.0, (times_s - self.times_s[before]) / np.where(gap, gap, 1.0), 0.0
+        )
+        fraction = fraction[:, None]
+        p = (1.0 - fraction) * self.poses[before, :3] + fraction * self.poses[after, :3]
         one, other = self.poses[before, 3:], self.poses[after, 3:]
         same = np.sign((one * other).sum(axis=1, keepdims=True) + 1e-300)
-        q = rotations.normalize((1.0 - share) * one + share * same * other)
+        q = rotations.normalize((1.0 - fraction) * one + fraction * same * other)
         unknown = (times_s < self.times_s[0]) | (times_s > self.times_s[-1])
         return np.where(unknown[:, None], np.nan, p), np.where(unknown[:, None], np.nan, q)
 

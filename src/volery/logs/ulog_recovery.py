@@ -24,7 +24,7 @@ SYNC = HEAD.pack(8, ord("S")) + bytes.fromhex("2f731320250cbb12")
 _BLOCK_BYTES = 1 << 16
 _CHAIN = 8
 """Messages in a row that show, without a synchronization message, where messages begin."""
-_MAX_PLACES = 1000
+_MAX_DAMAGES = 1000
 """Largest number of damaged places of one log, which bounds the time of the search."""
 _IS_KIND = np.isin(np.arange(256), list(KINDS))
 
@@ -33,18 +33,19 @@ class UlogRecovery:
     """Finds the next messages after damaged bytes, and describes the damage of one reading."""
 
     def __init__(self) -> None:
-        self._places: list[int] = []
+        self._damaged_at: list[int] = []
         self._skipped = 0
         self._has_sync = True
 
     @property
     def problem(self) -> str:
         """The damage so far; empty without any."""
-        if not self._places:
+        if not self._damaged_at:
             return ""
-        where = f"damaged at byte {self._places[0]}"
-        if len(self._places) > 1:
-            where = f"damaged at {len(self._places)} places, the first at byte {self._places[0]}"
+        where = f"damaged at byte {self._damaged_at[0]}"
+        if len(self._damaged_at) > 1:
+            where = f"damaged at {len(self._damaged_at)} places, the first at byte "
+            where += str(self._damaged_at[0])
         return f"{where}: {counted(self._skipped, 'byte')} skipped"
 
     def resume(self, file: BinaryIO, begin: int, end: int) -> int:
@@ -52,9 +53,9 @@ class UlogRecovery:
 
         end: where to stop searching, which is returned if nothing is readable before.
         """
-        self._places.append(begin)
+        self._damaged_at.append(begin)
         found = end
-        if len(self._places) <= _MAX_PLACES:
+        if len(self._damaged_at) <= _MAX_DAMAGES:
             found = self._after_damage(file, begin + 1, end)
         self._skipped += found - begin
         return found

@@ -94,7 +94,7 @@ def lengths_of(data: bytes) -> Iterator[int]:
 def _start_in(data: bytes, at: int) -> int:
     """Returns the index at which the next frame may start."""
     second, first = data.find(_SECOND, at), data.find(_FIRST, at)
-    found = [place for place in (second, first) if place >= 0]
+    found = [index for index in (second, first) if index >= 0]
     return min(found, default=len(data))
 
 

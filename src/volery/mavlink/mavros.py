@@ -78,7 +78,7 @@ class Mavros:
         self._odom = publisher("local_position/odom", Odometry)
         self._global = publisher("global_position/global", NavSatFix)
         subscriptions: dict[str, tuple[type[Any], Callable[[Any], OffboardSetpoint]]] = {
-            "setpoint_position/local": (PoseStamped, self._place),
+            "setpoint_position/local": (PoseStamped, self._pose_setpoint),
             "setpoint_velocity/cmd_vel": (TwistStamped, lambda m: _velocity(m.twist)),
             "setpoint_velocity/cmd_vel_unstamped": (Twist, _velocity),
             "setpoint_raw/local": (message_type(_TARGET), self._raw),
@@ -95,8 +95,8 @@ class Mavros:
             "cmd/land": (_TOL, self._land),
             "cmd/command": (_LONG, self._command),
         }
-        for name, (srvtype, answer) in services.items():
-            node.create_service(srvtype, f"{prefix}/{name}", answer, moves=moves)
+        for name, (srvtype, handler) in services.items():
+            node.create_service(srvtype, f"{prefix}/{name}", handler, moves=moves)
 
     # --------------------------------------------------------------------------------------- out
 
@@ -200,7 +200,7 @@ class Mavros:
             try:
                 setpoint = read(message)
             except CommandError as error:  # a topic has no response
-                self._context.complain(f"setpoint refused: {error}")
+                self._context.report_refusal(f"setpoint refused: {error}")
                 return
             offboard.take(self._context, _SOURCE, setpoint)
 
@@ -210,7 +210,7 @@ class Mavros:
         x, y, z = self._context.memory.origin
         return x + point.x, y + point.y, z + point.z
 
-    def _place(self, message: Any) -> OffboardSetpoint:
+    def _pose_setpoint(self, message: Any) -> OffboardSetpoint:
         q = message.pose.orientation
         yaw = heading_of((q.x, q.y, q.z, q.w))
         yaw = math.nan if yaw is None else yaw
@@ -220,7 +220,7 @@ class Mavros:
         mask = int(message.type_mask)
         if message.coordinate_frame not in (1, 8):
             raise CommandError(f"frame {message.coordinate_frame} is not supported")
-        place = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
+        position = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
         velocity = _masked(_parts(message.velocity), mask >> 3)
         push = _masked(_parts(message.acceleration_or_force), mask >> 6)
         if message.coordinate_frame == 8:
@@ -230,7 +230,7 @@ class Mavros:
             raise CommandError("forces are not supported")
         return _checked(
             OffboardSetpoint(
-                _masked(place, mask),
+                _masked(position, mask),
                 velocity,
                 push,
                 math.nan if mask & 1024 else message.yaw,
@@ -251,7 +251,7 @@ class Mavros:
         why = (
             "there is no such mode"
             if mode is None
-            else mode_transitions.ask_for(self._context, mode)
+            else mode_transitions.request_mode(self._context, mode)
         )
         if why:
             self._refuse(f"mode '{request.custom_mode}': {why}")
@@ -261,7 +261,7 @@ class Mavros:
     def _refuse(self, what: str) -> None:
         """Reports why a request is refused; the responses have no field for the reason."""
         _log.warning("%s: %s", self._prefix, what)
-        self._context.say(2, what)
+        self._context.report(2, what)
 
     def _take_off(self, request: Any, response: Any) -> Any:
         params = (0.0, 0.0, 0.0, request.yaw, request.latitude, request.longitude)

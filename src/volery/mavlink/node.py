@@ -31,7 +31,7 @@ PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _STATE = "volery_interfaces/msg/FlightState"
 _PACES: WeakKeyDictionary[Any, TransferRate] = WeakKeyDictionary()
 """Transfer pace of the vehicles of each graph, which share it."""
-MOST_SYSTEMS = 250
+MAX_SYSTEMS = 250
 """Largest system id of a vehicle; ids above are ground stations' by convention."""
 
 
@@ -47,8 +47,8 @@ class AutopilotNode(Node):
         wanted = int(self.declare_parameter("system_id", 0).value)
         given = self.declare_parameter("px4", {}).value
         self.system_id = wanted or self._own_number() or self._free_number()
-        if not 1 <= self.system_id <= MOST_SYSTEMS:
-            raise NodeError(f"system_id {self.system_id}: must be 1 to {MOST_SYSTEMS}")
+        if not 1 <= self.system_id <= MAX_SYSTEMS:
+            raise NodeError(f"system_id {self.system_id}: must be 1 to {MAX_SYSTEMS}")
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
         self.core = core.Autopilot(self.system_id, GraphVehicle(self), build, given)
@@ -120,14 +120,14 @@ class AutopilotNode(Node):
     def _own_number(self) -> int:
         """Returns N for uavN; 0 for other names."""
         found = re.fullmatch(r"/uav([1-9]\d{0,2})", self.get_namespace())
-        return int(found[1]) if found and int(found[1]) <= MOST_SYSTEMS else 0
+        return int(found[1]) if found and int(found[1]) <= MAX_SYSTEMS else 0
 
     def _free_number(self) -> int:
         """Returns the highest id that no other autopilot of the graph has."""
         parameters = self._context.graph.parameters
-        taken = {
+        used = {
             parameters.get(node, name).value
             for node, name in parameters.names()
             if name == "mavlink_id"
         }
-        return next(n for n in range(MOST_SYSTEMS, 0, -1) if n not in taken)
+        return next(n for n in range(MAX_SYSTEMS, 0, -1) if n not in used)

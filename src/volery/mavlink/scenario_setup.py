@@ -25,8 +25,8 @@ def with_autopilots(scenario: Scenario) -> Scenario:
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     for name, uav_type in scenario.types.items():
         if not any(is_same_node(entry.node, NODE) for entry in uav_type.nodes):
-            kept = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
-            data["types"][name] = {**data["types"][name], "nodes": [*kept, {"node": NODE}]}
+            nodes = [entry.model_dump(exclude_unset=True) for entry in uav_type.nodes]
+            data["types"][name] = {**data["types"][name], "nodes": [*nodes, {"node": NODE}]}
     return _parsed_like(scenario, data)
 
 

@@ -69,7 +69,7 @@ _UNKNOWN_ORIENTATION[0] = -1.0
 for _shared in (_NO_EFFORT, _UNKNOWN_ORIENTATION):
     _shared.flags.writeable = False
 _IDENTITY = Quaternion(0.0, 0.0, 0.0, 1.0)
-_MOST_CACHED = 1000
+_MAX_CACHED = 1000
 
 
 class _ReceivingRows(NamedTuple):
@@ -298,7 +298,7 @@ class GraphPublisher:
         found = self._receiving.get(id(sensors))
         if found is None or found.changes != self._graph.changes:
             rows = [row for row, sensor in enumerate(sensors) if self._has_receiver(sensor)]
-            if len(self._receiving) > _MOST_CACHED:
+            if len(self._receiving) > _MAX_CACHED:
                 self._receiving.clear()
             found = self._receiving[id(sensors)] = _ReceivingRows(
                 self._graph.changes, sensors, rows
@@ -343,7 +343,7 @@ def _range(readings: RangeSamples, row: int) -> Range:
 def _battery_state(readings: BatterySamples, i: int) -> BatteryState:
     """Returns a BatteryState: current below 0 while discharging, NaN for unknown values."""
     cells = int(readings.cells[i])
-    voltage, share = float(readings.voltage[i]), float(readings.charge[i])
+    voltage, charge = float(readings.voltage[i]), float(readings.charge[i])
     capacity = float(readings.capacity_ah[i])
     dead = readings.level[i] == BatteryLevel.EMPTY
     return BatteryState(
@@ -351,10 +351,10 @@ def _battery_state(readings: BatterySamples, i: int) -> BatteryState:
         single(voltage),
         math.nan,
         single(-readings.current[i]),
-        single(share * capacity),
+        single(charge * capacity),
         single(capacity),
         single(capacity),
-        single(share),
+        single(charge),
         BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         BatteryState.POWER_SUPPLY_HEALTH_DEAD if dead else BatteryState.POWER_SUPPLY_HEALTH_GOOD,
         BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,

@@ -20,7 +20,7 @@ _QUANTIZATION = 100.0
 _INVERSE_DEPTH = 0
 _HEADER = struct.Struct("<i2f")
 """Encoding and its two parameters, as in the plugin's memory: 12 bytes."""
-_MOST = 65535
+_MAX_UINT16 = 65535
 
 
 def jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
@@ -48,7 +48,7 @@ def packed_metres(depth: NDArray[np.float32], far_m: float) -> NDArray[np.uint8]
     b = 1.0 - a / far_m
     with np.errstate(invalid="ignore", divide="ignore"):
         coded = np.floor(np.float32(a) / depth + np.float32(b))
-        known = (depth > 0.0) & (depth < far_m) & (coded <= _MOST)
+        known = (depth > 0.0) & (depth < far_m) & (coded <= _MAX_UINT16)
     return _with_header(a, b, np.where(known, coded, 0.0).astype(np.uint16))
 
 

@@ -21,9 +21,9 @@ from volery.sensors.lidar.scan_patterns import PlanarScan, ScanPattern
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import LidarScans, SensorId
 
-MOST_RETURNS = 360
+MAX_RETURNS = 360
 """Maximum returns of a planar sweep: one per degree of the horizon ..."""
-MOST_RETURNS_OF_VOLUMES = 2048
+MAX_RETURNS_3D = 2048
 """... and of a three-dimensional scanner."""
 _KNOTS = 5
 """Instants of a sweep between which the nodding angle is interpolated linearly."""
@@ -99,7 +99,7 @@ def returns_message(scans: LidarScans, row: int, mount: Mount) -> PointCloud2:
 def _chosen_beams(pattern: ScanPattern) -> NDArray[np.int64]:
     """Returns evenly spaced beam numbers; for a scanner with rings, from all rings in turn."""
     planar = isinstance(pattern, PlanarScan)
-    step = -(-pattern.beam_count // (MOST_RETURNS if planar else MOST_RETURNS_OF_VOLUMES))
+    step = -(-pattern.beam_count // (MAX_RETURNS if planar else MAX_RETURNS_3D))
     while math.gcd(step, pattern.stride) > 1:
         step += 1
     return np.arange(0, pattern.beam_count, step)

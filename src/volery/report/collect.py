@@ -44,7 +44,7 @@ CLOUDS_PER_S = 4.0
 NODDING_WEIGHT = 4.0
 """Weight of a nodding scanner, which observes the third dimension, against a level one."""
 VOXEL_M = 0.25
-CLEARANCE_REACH_M = 10.0
+MAX_CLEARANCE_M = 10.0
 _POSES_KEPT = 64
 _CLEARANCE_BATCH = 4096
 
@@ -160,7 +160,7 @@ class FlightCollector:
             lidar=self._lidar_map(),
             events=tuple(drawn_event(event) for event in simulation.diagnostics.events),
             stage_seconds=dict(simulation.diagnostics.stage_seconds),
-            clearance_reach_m=CLEARANCE_REACH_M,
+            max_clearance_m=MAX_CLEARANCE_M,
             digest=digest,
             interrupted=interrupted,
             log_path=log_path,
@@ -192,10 +192,10 @@ class FlightCollector:
         for start in range(0, len(points), _CLEARANCE_BATCH):
             part = slice(start, start + _CLEARANCE_BATCH)
             result = self._simulation.world.scene.clearance(
-                points[part], CLEARANCE_REACH_M, include_terrain=False
+                points[part], MAX_CLEARANCE_M, include_terrain=False
             )
             found[part] = result.distance
-        found[found >= CLEARANCE_REACH_M] = np.inf
+        found[found >= MAX_CLEARANCE_M] = np.inf
         return found
 
     def _lidar_map(self) -> LidarMap | None:

@@ -73,7 +73,7 @@ class LoggedFlight:
 class LoggedTrajectory:
     """A trajectory of a log, and the problem of the file."""
 
-    way: RecordedTrajectory
+    trajectory: RecordedTrajectory
     problem: str
 
 
@@ -93,7 +93,7 @@ class _Rows:
             self.next_ns = time_ns + _POSE_NS
             self.poses.append((time_ns * 1e-9, *numbers))
 
-    def way(self) -> RecordedTrajectory:
+    def trajectory(self) -> RecordedTrajectory:
         """Returns the trajectory of all poses."""
         return RecordedTrajectory.of_rows(self.poses)
 
@@ -102,7 +102,7 @@ class _Rows:
 class _Log:
     """Data from a log's messages."""
 
-    ways: dict[str, _Rows] = field(default_factory=dict)
+    rows_of: dict[str, _Rows] = field(default_factory=dict)
     """By topic."""
     surveys: dict[str, TrunkSurvey] = field(default_factory=dict)
     """By UAV."""
@@ -144,23 +144,23 @@ class _Log:
             self.scenario, self.origin = _content(message), _origin(message)
         elif kind in _POSE_TYPES:
             message = decoder.decode(record).message
-            self.ways.setdefault(topic, _Rows()).take(message, stamp_of(message) or time_ns)
+            self.rows_of.setdefault(topic, _Rows()).take(message, stamp_of(message) or time_ns)
 
     def _survey(self, name: str) -> TrunkSurvey:
         return self.surveys.setdefault(name, TrunkSurvey(self.joints))
 
     def uav(self, name: str) -> LoggedUav | None:
         """Returns one of the UAVs; None without poses."""
-        truth = self.ways.get(f"/{name}/{TRUTH}")
-        own = next((f"/{name}/{t}" for t in ESTIMATES if f"/{name}/{t}" in self.ways), None)
+        truth = self.rows_of.get(f"/{name}/{TRUTH}")
+        own = next((f"/{name}/{t}" for t in ESTIMATES if f"/{name}/{t}" in self.rows_of), None)
         if truth is None and own is None:
             return None
-        way = None if own is None else self.ways[own].way()
+        trajectory = None if own is None else self.rows_of[own].trajectory()
         survey = self.surveys.get(name, TrunkSurvey())
-        trunks = np.zeros((0, 3)) if way is None else survey.trunks(way).seen_often
+        trunks = np.zeros((0, 3)) if trajectory is None else survey.trunks(trajectory).seen_often
         energy_j = self.batteries.get(name, EnergyMeter()).energy_j
-        true = None if truth is None else truth.way()
-        return LoggedUav(name, true, way, trunks, survey.is_founded, energy_j)
+        true = None if truth is None else truth.trajectory()
+        return LoggedUav(name, true, trajectory, trunks, survey.is_founded, energy_j)
 
 
 def read_flight(path: Path) -> LoggedFlight:
@@ -169,32 +169,32 @@ def read_flight(path: Path) -> LoggedFlight:
     Raises RecordingError if the file is no log, VoleryError if it holds no UAV.
     """
     log = _read(path)
-    names = sorted({topic.split("/")[1] for topic in log.ways if topic.count("/") > 1})
+    names = sorted({topic.split("/")[1] for topic in log.rows_of if topic.count("/") > 1})
     uavs = [uav for name in names if (uav := log.uav(name)) is not None]
     if not uavs:
         what = f"; the file is {log.problem}" if log.problem else ""
         raise VoleryError(f"{path}: the log holds no UAV's poses (/NAME/{ESTIMATES[-1]}){what}")
-    told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
+    in_scenario = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
     lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
-    texts, team = (told["name"], told["description"]), log.team.team(log.scenario)
+    texts, team = (in_scenario["name"], in_scenario["description"]), log.team.team(log.scenario)
     return LoggedFlight(uavs, *texts, lasts_s, log.origin, log.problem, team)
 
 
-def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
+def read_trajectory(path: Path, topic: str | None = None) -> LoggedTrajectory:
     """Returns one trajectory of a log: that of `topic`, or of its only pose topic.
 
     Raises VoleryError, which lists the topics, if that is not possible.
     """
     log = _read(path)
-    known = [name for name, rows in log.ways.items() if rows.poses and _is_trajectory(name)]
+    known = [name for name, rows in log.rows_of.items() if rows.poses and _is_trajectory(name)]
     if topic is None and len(known) == 1:
-        return LoggedTrajectory(log.ways[known[0]].way(), log.problem)
-    if topic is None or topic not in log.ways:
+        return LoggedTrajectory(log.rows_of[known[0]].trajectory(), log.problem)
+    if topic is None or topic not in log.rows_of:
         what = "the topic of the poses is ambiguous." if topic is None else f"there is no {topic}."
         if topic in log.types:
             what = f"{topic} holds no poses: it is a {log.types[topic]}."
         raise VoleryError(f"{path}: {what} Topics with poses: {', '.join(sorted(known)) or 'none'}")
-    return LoggedTrajectory(log.ways[topic].way(), log.problem)
+    return LoggedTrajectory(log.rows_of[topic].trajectory(), log.problem)
 
 
 def _is_trajectory(topic: str) -> bool:
@@ -216,8 +216,8 @@ def _read(path: Path) -> _Log:
 def _content(message: Any) -> dict[str, Any]:
     """Returns the scenario that a run recorded, empty if there is none."""
     try:
-        told = json.loads(message.data)
-        return dict(told["content"])
+        status = json.loads(message.data)
+        return dict(status["content"])
     except (AttributeError, KeyError, TypeError, ValueError):
         return {}
 

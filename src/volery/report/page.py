@@ -213,7 +213,7 @@ def _figures(flight: FlightData) -> list[str]:
         chart(
             charts.clearance_chart(flight),
             "Distance from the UAV's middle to the nearest obstacle, exact to the leaf; searched "
-            f"up to {flight.clearance_reach_m:g} m, where the line stays if there is none.",
+            f"up to {flight.max_clearance_m:g} m, where the line stays if there is none.",
         )
     )
     found.append(chart(charts.speed_chart(flight), "Speed over the ground and upward together."))
@@ -297,5 +297,5 @@ def _length(metres: float) -> str:
 
 def _clearance(metres: float, flight: FlightData) -> str:
     if math.isinf(metres):
-        return f"> {flight.clearance_reach_m:g} m"
+        return f"> {flight.max_clearance_m:g} m"
     return f"{metres:.2f} m"

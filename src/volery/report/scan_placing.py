@@ -51,12 +51,12 @@ def _in_map(in_body: Array, fraction: Array, ends: list[tuple[Array, Array]]) ->
     """Transforms points (n, 3) from body to map, between the two poses around their time."""
     pieces = len(ends) - 1
     piece = np.minimum((fraction * pieces).astype(np.int64), pieces - 1)
-    share = (fraction * pieces - piece)[:, None]
+    in_piece = (fraction * pieces - piece)[:, None]
     points = np.empty_like(in_body)
     for k in range(pieces):
         rows = piece == k
         first, last = (p + in_body[rows] @ rotations.matrix(q).T for p, q in ends[k : k + 2])
-        points[rows] = first + share[rows] * (last - first)
+        points[rows] = first + in_piece[rows] * (last - first)
     return points
 
 
@@ -67,8 +67,10 @@ def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
     )
     azimuth = scan.angle_min + scan.angle_increment * beams
-    reach = ranges[beams]
-    along = np.stack([reach * np.cos(azimuth), reach * np.sin(azimuth), np.zeros(len(beams))], -1)
+    ranges_hit = ranges[beams]
+    along = np.stack(
+        [ranges_hit * np.cos(azimuth), ranges_hit * np.sin(azimuth), np.zeros(len(beams))], -1
+    )
     return along, beams / max(len(ranges) - 1, 1)
 
 
@@ -98,9 +100,9 @@ def _pose_at(poses: deque[tuple[int, Any]], time_ns: int) -> tuple[Array, Array]
     (t0, a), (t1, b) = poses[before], poses[later]
     p0, q0 = _arrays(a)
     p1, q1 = _arrays(b)
-    share = min(max((time_ns - t0) / (t1 - t0), 0.0), 1.0) if t1 > t0 else 1.0
+    fraction = min(max((time_ns - t0) / (t1 - t0), 0.0), 1.0) if t1 > t0 else 1.0
     q1 = q1 if q0 @ q1 >= 0.0 else -q1
-    return p0 + share * (p1 - p0), rotations.normalize(q0 + share * (q1 - q0))
+    return p0 + fraction * (p1 - p0), rotations.normalize(q0 + fraction * (q1 - q0))
 
 
 def _arrays(pose: Any) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ _DOT_POINTS = 13.0
 _STILL_M_S = 0.2
 """Speed below which a team has no heading."""
 _BAR = 0.3
-_LEAST_COST = 1e-4
+_MIN_COST = 1e-4
 _LINE: dict[str, Any] = {"marker": ".", "ms": 4, "lw": 1.6}
 _BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.0, "ls": (0, (4, 2))}
 
@@ -107,7 +107,7 @@ def lines_over_time(
 def cost_over_time(time_s: Array, cost: Array, lost_cost: float, time_axis: TimeAxis) -> str:
     """Draws the cost (K,) of a formation on a logarithmic scale; returns SVG."""
     figure, axes = new_axes()
-    axes.plot(time_s, np.maximum(cost, _LEAST_COST), color=UAV_COLORS[0], label="cost", **_LINE)
+    axes.plot(time_s, np.maximum(cost, _MIN_COST), color=UAV_COLORS[0], label="cost", **_LINE)
     axes.set_yscale("log")
     if np.isfinite(lost_cost):
         axes.axhline(lost_cost, label=f"lost above {lost_cost:g}", **_BOUND)
@@ -118,13 +118,13 @@ def cost_over_time(time_s: Array, cost: Array, lost_cost: float, time_axis: Time
 def distance_over_time(
     time_s: Array, distance_m: Array, bound_m: float, time_axis: TimeAxis
 ) -> str:
-    """Draws the least distance (T,) m between UAVs, and its bound, if any; returns SVG."""
+    """Draws the minimum distance (T,) m between UAVs, and its bound, if any; returns SVG."""
     figure, axes = new_axes()
     keep = thinned(distance_m, lowest=True)
     axes.plot(time_s[keep], distance_m[keep], color=UAV_COLORS[0], lw=1.6, label="measured")
     if np.isfinite(bound_m):
         axes.axhline(bound_m, label=f"planned: {bound_m:g} m", **_BOUND)
-    _finish(figure, axes, "least distance, m", time_axis)
+    _finish(figure, axes, "minimum distance, m", time_axis)
     axes.set_ylim(0.0, None)
     return as_svg(figure)
 

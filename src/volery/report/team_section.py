@@ -27,7 +27,7 @@ from volery.report.trajectory_charts import clock_of
 _VIEWS = 6
 _STEP_S = 0.1
 """Period at which distances between UAVs are measured, s."""
-_MOST_STEPS = 36_000
+_MAX_STEPS = 36_000
 _SPEED_S = 0.5
 """Time before a moment over which velocities are measured, s."""
 _J_PER_WH = 3600.0
@@ -125,32 +125,34 @@ def _distance_chart(
 ) -> list[str]:
     if len(paths) < 2:
         return []
-    times, least = _least_distances(list(paths.values()))
-    if not np.isfinite(least).any():
+    times, min_distances = _min_distances(list(paths.values()))
+    if not np.isfinite(min_distances).any():
         return []
-    svg = distance_over_time(times - start_s, least, team.separation_m, axis)
-    nearest = int(np.nanargmin(least))
+    svg = distance_over_time(times - start_s, min_distances, team.separation_m, axis)
+    nearest = int(np.nanargmin(min_distances))
     text = (
-        "Least distance between any two UAVs, those on the ground included: "
-        f"{least[nearest]:.2f} m at {times[nearest] - start_s:.1f} s."
+        "Minimum distance between any two UAVs, those on the ground included: "
+        f"{min_distances[nearest]:.2f} m at {times[nearest] - start_s:.1f} s."
     )
     if math.isfinite(team.separation_m):
         text += f" {'Plans keep' if team.topic == FORMATION else 'ORCA keeps'} the dashed distance."
     return [_figure(svg, text)]
 
 
-def _least_distances(paths: Sequence[RecordedTrajectory]) -> tuple[Array, Array]:
-    """Returns times (T,) s and the least distances (T,) m; NaN where fewer than two are known."""
+def _min_distances(paths: Sequence[RecordedTrajectory]) -> tuple[Array, Array]:
+    """Returns times (T,) s and the minimum distances (T,) m; NaN where fewer than two are known."""
     start_s = min(float(path.time_s[0]) for path in paths)
     end_s = max(float(path.time_s[-1]) for path in paths)
-    steps = int(min((end_s - start_s) / _STEP_S, _MOST_STEPS))
+    steps = int(min((end_s - start_s) / _STEP_S, _MAX_STEPS))
     times = np.linspace(start_s, end_s, steps + 1)
     positions = np.stack([path.positions_at(times) for path in paths], axis=1)
-    least = np.full(len(times), np.inf)
+    min_distances = np.full(len(times), np.inf)
     for number in range(len(paths) - 1):
         apart = np.linalg.norm(positions[:, number + 1 :] - positions[:, number, None], axis=2)
-        least = np.minimum(least, np.where(np.isnan(apart), np.inf, apart).min(axis=1))
-    return times, np.where(np.isfinite(least), least, np.nan)
+        min_distances = np.minimum(
+            min_distances, np.where(np.isnan(apart), np.inf, apart).min(axis=1)
+        )
+    return times, np.where(np.isfinite(min_distances), min_distances, np.nan)
 
 
 def _energy_chart(flight: LoggedFlight) -> list[str]:

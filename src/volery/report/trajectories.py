@@ -62,8 +62,8 @@ class RecordedTrajectory:
         gap = self.time_s[k] - self.time_s[k - 1]
         if gap > _LONGEST_GAP_S:
             return None
-        share = (time_s - self.time_s[k - 1]) / gap
-        position = (1.0 - share) * self.position[k - 1] + share * self.position[k]
+        fraction = (time_s - self.time_s[k - 1]) / gap
+        position = (1.0 - fraction) * self.position[k - 1] + fraction * self.position[k]
         one, other = self.attitude[k - 1], self.attitude[k]
-        turn = (1.0 - share) * one + share * (other if one @ other >= 0.0 else -other)
+        turn = (1.0 - fraction) * one + fraction * (other if one @ other >= 0.0 else -other)
         return position, turn / np.linalg.norm(turn)

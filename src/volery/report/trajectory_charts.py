@@ -17,7 +17,7 @@ from volery.report.true_trunks import TrueTrunks
 
 _MAP_SIZE = (7.2, 6.4)
 _POINTS = 1500
-_LEAST_SHARE = 0.012
+_MIN_FRACTION = 0.012
 """Min width of a ring, as a fraction of the map's."""
 _DATES_S = 1e8
 """Threshold between run times and Unix times, s: no run lasts as long; Unix time passed it in
@@ -37,10 +37,10 @@ class ChartLine(NamedTuple):
     """(N, 3) m"""
 
 
-def ways_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks) -> str:
+def trajectories_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks) -> str:
     """Draws trajectories over the map of trunks (T, 2 or 3) and true ones, rings; returns SVG."""
     figure, axes = new_axes(*_MAP_SIZE)
-    if len(true.places):
+    if len(true.positions):
         _rings(axes, true)
     if len(trunks):
         axes.plot(*trunks[:, :2].T, ".", color=FAINT, markersize=4, label="trunks, by the estimate")
@@ -90,13 +90,13 @@ def clock_of(starts_s: Iterable[float]) -> tuple[float, str]:
 
 def _rings(axes: Any, true: TrueTrunks) -> None:
     """Draws true trunks as rings of their width, or of the min visible width."""
-    spread = float(np.ptp(true.places, axis=0).max())
-    widths = np.maximum(true.widths_m, _LEAST_SHARE * spread)
+    spread = float(np.ptp(true.positions, axis=0).max())
+    widths = np.maximum(true.widths_m, _MIN_FRACTION * spread)
     axes.add_collection(
         EllipseCollection(
             *(widths, widths, 0.0),
             units="xy",
-            offsets=true.places,
+            offsets=true.positions,
             transOffset=axes.transData,
             facecolors="none",
             edgecolors=INK,

@@ -12,7 +12,7 @@ import numpy as np
 from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
-from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
+from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_trajectory
 from volery.report.page import ReportError, chart_figure, check_target, html_page, write_page
 from volery.report.team_section import team_section
 from volery.report.trajectories import RecordedTrajectory
@@ -21,7 +21,7 @@ from volery.report.trajectory_charts import (
     date_text,
     is_date,
     over_time,
-    ways_from_above,
+    trajectories_from_above,
 )
 from volery.report.true_trunks import TrueTrunks, true_trunks
 from volery.results.alignment import (
@@ -33,11 +33,11 @@ from volery.results.alignment import (
     umeyama,
 )
 
-_LEAST = 10
+_MIN_POSES = 10
 """Min number of common poses for an error."""
 _APART = ".chart + .pair { margin-top: 1.2rem; }\n"
 """Space between the map and the charts below it, as between these."""
-_ALIKE, _LEFT_SHARE = 0.95, 0.1
+_ALIKE, _MAX_LEFT_FRACTION = 0.95, 0.1
 """Thresholds of the correlation of speeds, and of the distance relative to the spread, beyond which
 the flights may differ. Between two UAVs of one forest search, whose missions begin alike, 0.85 to
 0.91 and 0.12 to 0.15 were measured; between ground truth and estimate of one flight 1.00 and less
@@ -46,7 +46,7 @@ than 0.01.
 _TRUE_M = 0.5
 """Max distance between a mapped trunk and its tree."""
 _LONG_SHIFT_S = 86_400.0
-_LEAST_S, _MOST_S = 3.0, 86_400.0
+_MIN_S, _MAX_S = 3.0, 86_400.0
 """Min duration for a time alignment, and max duration searched, s."""
 
 
@@ -88,11 +88,11 @@ def write_log_report(
     parts += team_section(flight) if uav is None else []
     parts += [section for each in drawn for section in _estimate_section(each, trunks)]
     if compare is not None:
-        real = read_way(compare, compare_topic)
+        real = read_trajectory(compare, compare_topic)
         parts += _problem_notes(compare, real.problem, warnings)
-        laid = _laid_over(chosen, real.way, compare)
+        laid = _laid_over(chosen, real.trajectory, compare)
         parts += _comparison_section(chosen, laid, compare, trunks)
-        warnings += laid.doubts(compare)
+        warnings += laid.mismatches(compare)
         fit = laid.fit
     path = write_page(_page(log.name, _lead(flight), parts), folder, overwrite=overwrite)
     return LogReport(path, warnings, fit)
@@ -143,10 +143,10 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
     """Explains the rings, and how well mapped trunks fit them."""
     if near.why_none:
         return f" {escape(near.why_none)}"
-    if not len(near.places):
+    if not len(near.positions):
         return " No tree of the scenario is within 15 m of the trajectory."
     caption = (
-        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of it, by "
+        f" Rings: {counted(len(near.positions), 'tree')} of the scenario within 15 m of it, by "
         "the width of trunks (thin ones enlarged)."
     )
     away = near.distances_m(found)
@@ -160,7 +160,7 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
 
 def _error_text(estimate: RecordedTrajectory, truth: RecordedTrajectory) -> str:
     known = common_times(estimate.time_s, truth.time_s)
-    if known.sum() < _LEAST:
+    if known.sum() < _MIN_POSES:
         return ""
     own = estimate.position[known]
     true = at_times(truth.time_s, truth.position, estimate.time_s[known])
@@ -181,7 +181,7 @@ class _Laid(NamedTuple):
     """Root mean square distance, m."""
     size_m: float
     """Root mean square distance of the simulated trajectory from its centroid, m."""
-    share: float
+    fraction: float
     """Fraction of the real trajectory's poses within common times."""
 
     @property
@@ -189,10 +189,10 @@ class _Laid(NamedTuple):
         """Fit of the two trajectories, as text."""
         return (
             f"correlation of speeds {self.shift.alike:.2f}, {self.left_m:.2f} m apart (root mean "
-            f"square) over {self.share:.0%} of it"
+            f"square) over {self.fraction:.0%} of it"
         )
 
-    def doubts(self, log: Path) -> list[str]:
+    def mismatches(self, log: Path) -> list[str]:
         """Returns the reasons why the two may be different flights."""
         found = []
         if self.shift.alike < _ALIKE:
@@ -201,26 +201,26 @@ class _Laid(NamedTuple):
                 "two UAVs on missions that begin alike reach 0.9), so the shift in time may be "
                 "wrong"
             )
-        if self.left_m > _LEFT_SHARE * self.size_m:
+        if self.left_m > _MAX_LEFT_FRACTION * self.size_m:
             found.append(
                 f"the trajectories are {self.left_m:.2f} m apart (root mean square), the simulated "
                 f"one spreads by {self.size_m:.1f} m"
             )
-        return [f"{log}: it may be another flight: {doubt}" for doubt in found]
+        return [f"{log}: it may be another flight: {mismatch}" for mismatch in found]
 
 
 def _laid_over(uav: LoggedUav, real: RecordedTrajectory, log: Path) -> _Laid:
     simulated = uav.truth or uav.estimate
-    if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
+    if simulated is None or min(real.lasts_s, simulated.lasts_s) < _MIN_S:
         raise VoleryError(f"{log}: too few poses for a comparison with {uav.name}")
-    if real.lasts_s > _MOST_S:
+    if real.lasts_s > _MAX_S:
         raise VoleryError(
             f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set in flight?"
         )
     shift = time_shift(simulated.time_s, simulated.position, real.time_s, real.position)
     times = real.time_s + shift.seconds
     known = common_times(times, simulated.time_s)
-    if known.sum() < _LEAST:
+    if known.sum() < _MIN_POSES:
         raise VoleryError(f"{log}: no time in common with {uav.name}")
     there = at_times(simulated.time_s, simulated.position, times[known])
     aligned = umeyama(real.position[known], there).apply(real.position)
@@ -228,7 +228,9 @@ def _laid_over(uav: LoggedUav, real: RecordedTrajectory, log: Path) -> _Laid:
         ChartLine(f"simulated {uav.name}", simulated.time_s, simulated.position),
         ChartLine("real", times, aligned),
     ]
-    left, size = (_rms(way) for way in (aligned[known] - there, there - there.mean(axis=0)))
+    left, size = (
+        _rms(difference) for difference in (aligned[known] - there, there - there.mean(axis=0))
+    )
     return _Laid(lines, shift, left, size, float(known.mean()))
 
 
@@ -253,9 +255,11 @@ def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrun
         f"The flight of {escape(log.name)} over that of {escape(uav.name)}: {_shift_text(laid)} "
         f"(where their speeds are most alike, with a correlation of "
         f"{laid.shift.alike:.2f}), turned and moved onto it. Root mean square distance "
-        f"{laid.left_m:.2f} m over {laid.share:.0%} of it."
+        f"{laid.left_m:.2f} m over {laid.fraction:.0%} of it."
     )
-    notes = [f'<p class="note">{escape(doubt)}.</p>' for doubt in laid.doubts(Path(log.name))]
+    notes = [
+        f'<p class="note">{escape(mismatch)}.</p>' for mismatch in laid.mismatches(Path(log.name))
+    ]
     near = trunks.near(laid.lines[0].position)
     figures = _figures(laid.lines, uav.trunks, near, caption)
     return ["<h2>Real against simulated</h2>", *notes, *figures]
@@ -277,7 +281,7 @@ def _figures(
         return chart_figure(svg, f"<figcaption>{text}</figcaption>")
 
     return [
-        figure(ways_from_above(lines, trunks, true), caption),
+        figure(trajectories_from_above(lines, trunks, true), caption),
         '<div class="pair">',
         figure(over_time(lines, 0), "x over time."),
         figure(over_time(lines, 1), "y over time."),

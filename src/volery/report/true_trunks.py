@@ -22,30 +22,30 @@ _EVERY = 20
 class TrueTrunks(NamedTuple):
     """Trunks of T trees."""
 
-    places: Array
+    positions: Array
     """(T, 2) m, in the map."""
     widths_m: Array
     """(T,) m, diameter at breast height."""
     why_none: str = ""
     """Why there are none, as a sentence."""
 
-    def near(self, way: Array) -> TrueTrunks:
+    def near(self, path: Array) -> TrueTrunks:
         """Returns the trunks near the positions (N, 2 or 3) of a trajectory."""
-        if not len(self.places) or not len(way):
+        if not len(self.positions) or not len(path):
             return self
-        seen = np.zeros(len(self.places), np.bool_)
-        for place in way[::_EVERY, :2]:
-            seen |= np.hypot(*(self.places - place).T) <= _NEAR_M
-        return TrueTrunks(self.places[seen], self.widths_m[seen], self.why_none)
+        seen = np.zeros(len(self.positions), np.bool_)
+        for position in path[::_EVERY, :2]:
+            seen |= np.hypot(*(self.positions - position).T) <= _NEAR_M
+        return TrueTrunks(self.positions[seen], self.widths_m[seen], self.why_none)
 
     def distances_m(self, found: Array) -> Array:
         """Returns distances (F,) m to the nearest trunk; empty without trunks.
 
         found: positions (F, 2 or 3) m.
         """
-        if not len(self.places):
+        if not len(self.positions):
             return np.zeros(0)
-        return np.array([np.hypot(*(self.places - place[:2]).T).min() for place in found])
+        return np.array([np.hypot(*(self.positions - position[:2]).T).min() for position in found])
 
 
 def no_trunks(why: str) -> TrueTrunks:

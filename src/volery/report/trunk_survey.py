@@ -25,7 +25,7 @@ LEVEL, NODDING = "laser/horizontal/scan", "laser/nodding/scan"
 _JOINT = "laser_nodding"
 _LEVEL_NS, _NODDING_NS = 500_000_000, 75_000_000
 """Every third of 40 nodding scans a second, so that a period of a second does not repeat angles."""
-_NEAREST_M, _FARTHEST_M = 0.6, 20.0
+_NEAREST_M, _MAX_RANGE_M = 0.6, 20.0
 
 
 class TrunkSurvey:
@@ -73,24 +73,27 @@ class TrunkSurvey:
             beams = np.array([*angles, float(message.time_increment)])
             self._nodding.append((frame, first, beams, np.array(message.ranges, np.float32)))
 
-    def trunks(self, way: RecordedTrajectory) -> TrunkMap:
+    def trunks(self, trajectory: RecordedTrajectory) -> TrunkMap:
         """Returns the map of trunks for an estimated trajectory."""
-        columns = VerticalStructures(self._returns(way)) if self.is_founded else None
+        columns = VerticalStructures(self._returns(trajectory)) if self.is_founded else None
         found = TrunkMap()
         for frame, first, step, seen in self._seen:
             mount = self.joints.mount_of(frame)
-            places = [_placed(trunk, first + step * trunk[2], mount, way) for trunk in seen]
-            kept = [p for p in places if p is not None and (columns is None or columns.stands(p))]
+            placed = [_placed(trunk, first + step * trunk[2], mount, trajectory) for trunk in seen]
+            kept = [p for p in placed if p is not None and (columns is None or columns.stands(p))]
             found.add(np.array(kept).reshape(-1, 3))
         return found
 
-    def _returns(self, way: RecordedTrajectory) -> Array:
+    def _returns(self, trajectory: RecordedTrajectory) -> Array:
         """Returns the returns (N, 3) of the nodding LIDAR in the map."""
         nods = np.array(sorted(self._nods)).T
         found = [np.zeros((0, 3))]
         for frame, first, (angle, turn, step), ranges in self._nodding:
-            beams = np.flatnonzero((ranges > _NEAREST_M) & (ranges < _FARTHEST_M))
-            before, after = way.pose_at(first), way.pose_at(first + step * len(ranges))
+            beams = np.flatnonzero((ranges > _NEAREST_M) & (ranges < _MAX_RANGE_M))
+            before, after = (
+                trajectory.pose_at(first),
+                trajectory.pose_at(first + step * len(ranges)),
+            )
             if before is None or after is None or not len(beams):
                 continue
             nod = np.interp(first + step * beams, *nods)
@@ -103,9 +106,11 @@ class TrunkSurvey:
         return np.concatenate(found)
 
 
-def _placed(trunk: Array, seconds: float, mount: Mount, way: RecordedTrajectory) -> Array | None:
+def _placed(
+    trunk: Array, seconds: float, mount: Mount, trajectory: RecordedTrajectory
+) -> Array | None:
     """Returns the map position (3,) of a trunk in a level scan; None if the pose is unknown."""
-    pose = way.pose_at(seconds)
+    pose = trajectory.pose_at(seconds)
     if pose is None:
         return None
     flat = np.array([trunk[0], trunk[1], 0.0])

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 
-_NEAREST_M, _FARTHEST_M = 0.6, 15.0
+_NEAREST_M, _MAX_RANGE_M = 0.6, 15.0
 _APART_M = 0.35
 """Range difference of neighbouring beams above which they hit different objects."""
 _STANDS_OUT_M = 0.6
 """Min range difference between a trunk and its neighbours."""
-_LEAST_BEAMS = 4
+_MIN_BEAMS = 4
 _NARROWEST_M, _WIDEST_M = 0.06, 1.2
 _SAME_M = 0.8
 """Distance within which two detections are of one trunk. All modelling choices."""
@@ -32,12 +32,12 @@ def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: fl
     """Returns candidates (K, 3): centre x, y in the scanner's frame, m, and index of the beam."""
     r = np.asarray(ranges, np.float64)
     r = np.where(np.isfinite(r) & (r > _NEAREST_M), r, np.inf)
-    near = np.minimum(r, 2.0 * _FARTHEST_M)
+    near = np.minimum(r, 2.0 * _MAX_RANGE_M)
     starts = np.flatnonzero(np.abs(np.diff(near)) > _APART_M) + 1
     found = []
     for first, end in pairwise(starts):
         part = near[first:end]
-        if end - first < _LEAST_BEAMS or part.max() > _FARTHEST_M:
+        if end - first < _MIN_BEAMS or part.max() > _MAX_RANGE_M:
             continue
         wide = float(part.mean()) * (end - first) * increment
         stands_out = min(near[first - 1] - part[0], near[end] - part[-1]) > _STANDS_OUT_M
@@ -53,7 +53,7 @@ def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: fl
 class TrunkMap:
     """Trunks, each the mean of its detections."""
 
-    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    positions: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(T, 3) m, map, at the height of detection."""
     sightings: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """(T,) numbers of detections."""
@@ -61,16 +61,16 @@ class TrunkMap:
     @property
     def seen_often(self) -> Array:
         """(S, 3) m, trunks detected three times or more."""
-        return self.places[self.sightings >= _SEEN_OFTEN]
+        return self.positions[self.sightings >= _SEEN_OFTEN]
 
     def add(self, seen: Array) -> None:
         """Adds the trunks (K, 3) of one scan."""
-        for place in seen:
-            away = np.hypot(*(self.places - place)[:, :2].T)
+        for position in seen:
+            away = np.hypot(*(self.positions - position)[:, :2].T)
             if len(away) and away.min() <= _SAME_M:
                 k = int(np.argmin(away))
                 self.sightings[k] += 1
-                self.places[k] += (place - self.places[k]) / self.sightings[k]
+                self.positions[k] += (position - self.positions[k]) / self.sightings[k]
             else:
-                self.places = np.concatenate([self.places, place[None]])
+                self.positions = np.concatenate([self.positions, position[None]])
                 self.sightings = np.append(self.sightings, 1)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 
 _RATE_HZ, _SMOOTHED = 10.0, 5
-_LEAST_COMMON = 0.3
-_LEAST_SPREAD = 1e-12
+_MIN_COMMON = 0.3
+_MIN_SPREAD = 1e-12
 
 
 class Alignment(NamedTuple):
@@ -28,16 +28,16 @@ class Alignment(NamedTuple):
     translation: Array
     """(3,)"""
 
-    def apply(self, places: Array) -> Array:
+    def apply(self, positions: Array) -> Array:
         """Returns positions (N, 3) in the other frame."""
-        moved: Array = places @ self.rotation.T + self.translation
+        moved: Array = positions @ self.rotation.T + self.translation
         return moved
 
 
-def umeyama(places: Array, onto: Array) -> Alignment:
+def umeyama(positions: Array, onto: Array) -> Alignment:
     """Returns the least-squares transform of positions (N, 3) to `onto` (N, 3)."""
-    from_mean, to_mean = places.mean(axis=0), onto.mean(axis=0)
-    covariance = (onto - to_mean).T @ (places - from_mean) / len(places)
+    from_mean, to_mean = positions.mean(axis=0), onto.mean(axis=0)
+    covariance = (onto - to_mean).T @ (positions - from_mean) / len(positions)
     u, _, vt = np.linalg.svd(covariance)
     mirror = np.ones(3)
     if np.linalg.det(u) * np.linalg.det(vt) < 0.0:
@@ -52,9 +52,9 @@ def ate_rmse_m(estimate: Array, truth: Array) -> float:
     return float(np.sqrt((left * left).sum(axis=1).mean()))
 
 
-def at_times(time_s: Array, places: Array, wanted_s: Array) -> Array:
+def at_times(time_s: Array, positions: Array, wanted_s: Array) -> Array:
     """Interpolates positions (N, 3) at increasing `time_s` (N,) to `wanted_s` (M,); (M, 3)."""
-    return np.stack([np.interp(wanted_s, time_s, column) for column in places.T], axis=1)
+    return np.stack([np.interp(wanted_s, time_s, column) for column in positions.T], axis=1)
 
 
 def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
@@ -81,23 +81,23 @@ def time_shift(one_s: Array, one: Array, other_s: Array, other: Array) -> TimeSh
     tenths of the shorter trajectory; their frames may differ.
     """
     mine, theirs = _speeds(one_s, one), _speeds(other_s, other)
-    least = max(round(_LEAST_COMMON * min(len(mine), len(theirs))), 3)
+    min_overlap = max(round(_MIN_COMMON * min(len(mine), len(theirs))), 3)
     best, best_lag = -np.inf, 0
-    for lag in range(least - len(theirs), len(mine) - least + 1):
+    for lag in range(min_overlap - len(theirs), len(mine) - min_overlap + 1):
         a = mine[max(lag, 0) : lag + len(theirs)]
         b = theirs[max(-lag, 0) : max(-lag, 0) + len(a)]
         a, b = a - a.mean(), b - b.mean()
         spread = float(np.sqrt((a @ a) * (b @ b)))
-        alike = float(a @ b) / spread if spread > _LEAST_SPREAD else -1.0
+        alike = float(a @ b) / spread if spread > _MIN_SPREAD else -1.0
         if alike > best:
             best, best_lag = alike, lag
     return TimeShift(float(one_s[0] - other_s[0]) + best_lag / _RATE_HZ, best)
 
 
-def _speeds(time_s: Array, places: Array) -> Array:
+def _speeds(time_s: Array, positions: Array) -> Array:
     """Returns ten speeds a second, each over the next second, smoothed over half a second."""
     times = np.arange(time_s[0], time_s[-1], 1.0 / _RATE_HZ)
-    rough = at_times(time_s, places, times)
+    rough = at_times(time_s, positions, times)
     window = np.full(_SMOOTHED, 1.0 / _SMOOTHED)
     smooth = np.stack([np.convolve(column, window, "valid") for column in rough.T], axis=1)
     over = round(_RATE_HZ)

@@ -91,8 +91,8 @@ def _flight_data(result: FlightStates) -> FlightData:
 
 def _plain_ground(tracks: list[UavTrack]) -> Ground:
     """Returns level ground around the paths."""
-    places = [track.position_map[:, :2] for track in tracks if len(track.position_map)]
-    flown = np.concatenate(places) if places else np.zeros((1, 2))
+    positions = [track.position_map[:, :2] for track in tracks if len(track.position_map)]
+    flown = np.concatenate(positions) if positions else np.zeros((1, 2))
     low = flown.min(axis=0) - _MARGIN_M
     spacing = float((flown.max(axis=0) - low).max() + _MARGIN_M)
     return Ground(np.zeros((2, 2)), (float(low[0]), float(low[1])), spacing)

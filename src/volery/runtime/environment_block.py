@@ -74,11 +74,13 @@ class EnvironmentBlock:
         self._first = first
         num_envs = len(self.seeds)
         begun = worlds.dealt(first, num_envs)
-        everyone = tuple(start for world in begun.tolist() for start in worlds.world(world).starts)
+        all_starts = tuple(
+            start for world in begun.tolist() for start in worlds.world(world).starts
+        )
         names = tuple(f"{k}/{start.name}" for k in range(num_envs) for start in self._starts)
-        self.fleet = build_fleet(scenario, everyone, names, num_envs=num_envs)
+        self.fleet = build_fleet(scenario, all_starts, names, num_envs=num_envs)
         self._scene = worlds.scene.twin()
-        add_bodies(self._scene, everyone, num_envs=num_envs)
+        add_bodies(self._scene, all_starts, num_envs=num_envs)
         self.world = begun.copy()
         """(num_envs,) number of the world of each environment."""
         self._begun = begun
@@ -100,7 +102,7 @@ class EnvironmentBlock:
         )
         banks = self._engine.banks
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
-        self._places = _places(banks)
+        self._sensor_rows = _rows_by_sensor(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
         self._bank_uavs = [np.array([sensor.uav for sensor in bank.sensors]) for bank in banks]
         """By bank: (S,) row of the UAV of each sensor."""
@@ -116,7 +118,7 @@ class EnvironmentBlock:
         self._landed_state = self.fleet.get_state()
         self._flying_state: dict[str, Any] | None = None
         self._is_estimated = estimation is not None
-        self._take_off(np.arange(len(everyone)))
+        self._take_off(np.arange(len(all_starts)))
         self._start_state = self._landed_state if self._is_estimated else self.fleet.get_state()
 
     # -------------------------------------------------------------------------------------- time
@@ -246,9 +248,9 @@ class EnvironmentBlock:
 
     def uav(self, env: int, name: str) -> Uav:
         """Returns the handle on one UAV."""
-        place = [start.name for start in self._starts].index(name)
-        row = env * len(self._starts) + place
-        flight = self._scenario.types[self._starts[place].type_name].flight
+        index = [start.name for start in self._starts].index(name)
+        row = env * len(self._starts) + index
+        flight = self._scenario.types[self._starts[index].type_name].flight
         path = f"{self._first + env}/{name}"
         sensors = UavSensors(self, None, path)
         return Uav(self.fleet, row, name, flight, sensors=sensors, futures=self.futures, path=path)
@@ -261,7 +263,7 @@ class EnvironmentBlock:
         A row is not new if its sample is from before the reset of its environment. None before the
         first sample.
         """
-        bank, rows = self._places[uav, sensor]
+        bank, rows = self._sensor_rows[uav, sensor]
         batch = self._latest[bank]
         if batch is None:
             return None
@@ -274,7 +276,7 @@ class EnvironmentBlock:
     def names(self, uav: str) -> tuple[str, ...]:
         """Returns the names of the sensors of a UAV, `ENV/NAME`."""
         name = uav.rsplit("/", maxsplit=1)[-1]
-        return tuple(sensor for own, sensor in self._places if own == name)
+        return tuple(sensor for own, sensor in self._sensor_rows if own == name)
 
     def latest(self, uav: str, sensor: str) -> SensorSample | None:
         """Returns the last sample of a sensor of a UAV, `ENV/NAME`, None before the first."""
@@ -292,7 +294,7 @@ class EnvironmentBlock:
     def kind(self, uav: str, sensor: str) -> str:
         """Returns the kind of a sensor of a UAV, `NAME` or `ENV/NAME`, such as `gnss`."""
         name = uav.rsplit("/", maxsplit=1)[-1]
-        return self._engine.banks[self._places[name, sensor][0]].name
+        return self._engine.banks[self._sensor_rows[name, sensor][0]].name
 
     def is_camera(self, uav: str, sensor: str) -> bool:  # noqa: ARG002 - as for all
         """Returns False: cameras of environments render without a reader."""
@@ -300,7 +302,7 @@ class EnvironmentBlock:
 
     def request_parts(self, uav: str, sensor: str, parts: Collection[Part]) -> None:
         """Renders only `parts` of a camera's images; see `EnvironmentSensor.request_parts`."""
-        bank = getattr(self._engine.banks[self._places[uav, sensor][0]], "bank", None)
+        bank = getattr(self._engine.banks[self._sensor_rows[uav, sensor][0]], "bank", None)
         wanted = tuple(parts)
         if not isinstance(bank, CameraBank):
             raise SensorError(f"sensor '{sensor}' of {uav} is no camera: it has no parts of images")
@@ -322,9 +324,9 @@ class EnvironmentBlock:
         Raises `CommandError` if there is no such sensor.
         """
         try:
-            bank, rows = self._places[uav, sensor]
+            bank, rows = self._sensor_rows[uav, sensor]
         except KeyError:
-            known = ", ".join(f"{uav} {sensor}" for uav, sensor in self._places)
+            known = ", ".join(f"{uav} {sensor}" for uav, sensor in self._sensor_rows)
             raise CommandError(f"no sensor '{sensor}' of '{uav}'; known: {known}") from None
         samples = self._latest[bank]
         if samples is None:
@@ -371,10 +373,10 @@ class EnvironmentBlock:
 
     def _paths_of(self, rows: NDArray[np.int64]) -> list[str]:
         """Returns `ENV/NAME` of the UAVs `rows`."""
-        envs, places = np.divmod(rows, len(self._starts))
+        envs, indices = np.divmod(rows, len(self._starts))
         return [
-            f"{self._first + env}/{self._starts[place].name}"
-            for env, place in zip(envs.tolist(), places.tolist(), strict=True)
+            f"{self._first + env}/{self._starts[index].name}"
+            for env, index in zip(envs.tolist(), indices.tolist(), strict=True)
         ]
 
     def _mark_old(self, rows: NDArray[np.int64]) -> None:
@@ -455,25 +457,25 @@ class EnvironmentBlock:
         """Seeds the turbulence of each environment."""
         num_uavs = len(self._starts)
         rows = envs[:, None] * num_uavs + np.arange(num_uavs)
-        for place, start in enumerate(self._starts):
+        for index, start in enumerate(self._starts):
             name = turbulence_stream(start.name)
             keys = [stream_key(self.seeds[env], name) for env in envs.tolist()]
-            self.fleet.set_turbulence_keys(rows[:, place], np.array(keys, np.uint64))
+            self.fleet.set_turbulence_keys(rows[:, index], np.array(keys, np.uint64))
 
 
 def _arrays(samples: Samples) -> dict[str, NDArray[Any]]:
     return {name: v for name, v in vars(samples).items() if isinstance(v, np.ndarray)}
 
 
-def _places(banks: Sequence[Bank]) -> dict[tuple[str, str], tuple[int, NDArray[np.int64]]]:
+def _rows_by_sensor(banks: Sequence[Bank]) -> dict[tuple[str, str], tuple[int, NDArray[np.int64]]]:
     """Returns the bank and rows of each sensor, by UAV name and sensor name."""
-    places: dict[tuple[str, str], tuple[int, list[int]]] = {}
+    indices: dict[tuple[str, str], tuple[int, list[int]]] = {}
     for k, bank in enumerate(banks):
         if bank.name == "joints":
             continue
         for row, sensor in enumerate(bank.sensors):
-            places.setdefault((sensor.uav_name, sensor.name), (k, []))[1].append(row)
-    return {names: (k, np.array(rows)) for names, (k, rows) in places.items()}
+            indices.setdefault((sensor.uav_name, sensor.name), (k, []))[1].append(row)
+    return {names: (k, np.array(rows)) for names, (k, rows) in indices.items()}
 
 
 def saved_samples(samples: Samples | None) -> dict[str, Any] | None:

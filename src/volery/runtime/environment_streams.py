@@ -56,11 +56,11 @@ class EnvironmentStreams:
         own = {
             sensor.id.uav: stream_name(sensor.spec.kind, sensor.id) for sensor in self._estimates
         }
-        envs, places = np.divmod(uavs, self._num_uavs)
+        envs, indices = np.divmod(uavs, self._num_uavs)
         return {
-            uav: stream_key(self._seeds[env], own[place])
-            for uav, env, place in zip(uavs.tolist(), envs.tolist(), places.tolist(), strict=True)
-            if place in own
+            uav: stream_key(self._seeds[env], own[index])
+            for uav, env, index in zip(uavs.tolist(), envs.tolist(), indices.tolist(), strict=True)
+            if index in own
         }
 
 

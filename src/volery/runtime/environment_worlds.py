@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.errors import ScenarioError
-from volery.runtime.construction.fleet import build_fleet, place
+from volery.runtime.construction.fleet import build_fleet, place_fleet
 from volery.runtime.construction.placement import StartPose
 from volery.runtime.construction.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.scenario.schema import Scenario
@@ -59,7 +59,7 @@ class EnvironmentWorlds:
             city = build_city(scenario, self.terrain)
             forest = build_forest(scenario, self.terrain, city)
             scene = build_scene(scenario, self.terrain, forest, city)
-            starts = place(scenario, scene, self.terrain)
+            starts = place_fleet(scenario, scene, self.terrain)
             self._built[number] = EnvironmentWorld(city, forest, scene, starts)
         return self._built[number]
 

@@ -26,7 +26,7 @@ class GridMapManager:
         world = scenario.world.grid_map
         self._engine = engine
         self._on_blocks = on_blocks
-        self.tell: Callable[[GridMap], None] = lambda _grid: None
+        self.on_change: Callable[[GridMap], None] = lambda _grid: None
         """Callback with each map that is shown; it must change nothing."""
         entries = () if world is None else world.maps
         self._maps = {entry.called: read_grid_map(scenario, entry) for entry in entries}
@@ -83,7 +83,7 @@ class GridMapManager:
         self._maps = {**self._maps, grid.name: grid}
         self._stand(grid, blocks)
         self._engine.note_world(grid.describe())
-        self.tell(grid)
+        self.on_change(grid)
 
     def refuse(self, reason: str) -> None:
         """Logs an event with the reason why a received map is not shown."""

@@ -26,13 +26,13 @@ class IdleServer:
     scenario = geometry = operators = None
     waits_at_end = False
 
-    def __init__(self, on_load: OnLoad, shelf: ScenarioCatalog | None = None) -> None:
+    def __init__(self, on_load: OnLoad, catalog: ScenarioCatalog | None = None) -> None:
         self.quitting = False
         self._inbox = CommandQueue()
         self.graph = Graph(lambda: 0, self._inbox.post)
         self.gateway = Gateway(self.graph, self._inbox.post)
         offer_features(self.graph, loads_worlds=True)
-        offer_worlds(self.graph, None, on_load, shelf)
+        offer_worlds(self.graph, None, on_load, catalog)
         get, put = f"{_SRV}/GetSimulationState", f"{_SRV}/SetSimulationState"
         offer_result(self.graph, "/get_simulation_state", get, self._get_state)
         offer_result(self.graph, "/set_simulation_state", put, self._set_state)

@@ -144,11 +144,11 @@ class RunLoop:
         engine, pacer = self._engine, self._pacer
         start_ns = engine.time_ns
         pacer.begin(speed, start_ns)
-        teller = ProgressPublisher(on_progress, left, pacer)
+        progress = ProgressPublisher(on_progress, left, pacer)
         over = engine.fleet.step >= find_end() or self.quitting
 
         def while_waiting() -> bool:
-            teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
+            progress.report(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
             return not self.quitting
 
         engine.while_waiting = while_waiting
@@ -160,12 +160,12 @@ class RunLoop:
             while self._is_held() and not (over and pacer.paused):
                 engine.process_commands(pacer.idle_s())
                 look()
-                teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
+                progress.report(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
                 if self.quitting:
                     over = True
                     break
                 yield
-            teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
+            progress.report(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
             yield
         engine.state_check.look()
         if self.finished:

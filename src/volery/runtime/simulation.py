@@ -142,7 +142,7 @@ class Simulation(Uncopied):
         self.commands = CommandLog(graph, engine, self._end.refusal)
         publish_origin(graph, scenario)
         world_topic = WorldTopic(graph, lambda: self.geometry)
-        grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
+        grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.publish))
         self._manager = manager = build_vehicles(scenario, connected, world, self._runs, partition)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
         self.uavs = UavView(manager.uavs)
@@ -169,12 +169,12 @@ class Simulation(Uncopied):
             self._recording,
             self._end,
             on_load=on_load,
-            shelf=shelf,
+            catalog=shelf,
             every=engine.every,
         )
         self._snapshots.save_start()
         manager.take_off(self.uavs)
-        world_topic.tell()
+        world_topic.publish()
 
     # ---------------------------------------------------------------------------------------- runs
 

@@ -46,7 +46,7 @@ class Snapshot(Uncopied):
         return s_from_ns(self.time_ns)
 
 
-def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
+def save_nodes(nodes: Sequence[Node]) -> NodeStates:
     """Returns the state of each node (None without `get_state`) and its base state."""
     for node in nodes:
         node.join()
@@ -58,8 +58,8 @@ def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
     }
 
 
-def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
-    """Restores the node states that `keep_nodes` returned."""
+def restore_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
+    """Restores the node states that `save_nodes` returned."""
     for key, node in _keyed(nodes):
         state, base = copy.deepcopy(states[key])
         node.join()

@@ -21,8 +21,8 @@ from volery.runtime.snapshot import (
     Snapshot,
     check_nodes,
     check_partners,
-    keep_nodes,
-    put_back_nodes,
+    restore_nodes,
+    save_nodes,
     without_state,
 )
 from volery.runtime.vehicles.manager import VehicleManager
@@ -67,7 +67,7 @@ class SnapshotManager:
 
     def enlist(self, name: str) -> None:
         """Records the initial node states of a UAV that was just spawned."""
-        self._new_nodes.update(keep_nodes(self._nodes_of(name)))
+        self._new_nodes.update(save_nodes(self._nodes_of(name)))
 
     def snapshot(self) -> Snapshot:
         """Returns the present state. Raises `SnapshotError` if it cannot be saved."""
@@ -89,7 +89,7 @@ class SnapshotManager:
         if snapshot.starts != self._manager.starts:
             then = ", ".join(start.name for start in snapshot.starts)
             raise SnapshotError(f"UAVs were spawned or deleted since the snapshot of {then}")
-        self._put_back(snapshot.state, "another state was restored")
+        self._restore_state(snapshot.state, "another state was restored")
 
     def reset(self, seed: int) -> None:
         """Restores the start and its UAVs, with the random streams of `seed`."""
@@ -103,7 +103,7 @@ class SnapshotManager:
             except Exception:
                 self._manager.start_nodes()
                 raise
-        self._put_back(self._start, "the simulation was reset")
+        self._restore_state(self._start, "the simulation was reset")
         with self._graph.in_place_of(self._start["graph"]):
             self._manager.start_nodes()
         fleet = self._engine.fleet
@@ -134,7 +134,7 @@ class SnapshotManager:
         if without_state(self._nodes_of(name)):
             self._manager.restart_nodes(name)
         else:
-            put_back_nodes(self._nodes_of(name), self._new_nodes)
+            restore_nodes(self._nodes_of(name), self._new_nodes)
         self._manager.faults.mend(name)
         self._manager.take_off([name])
 
@@ -163,7 +163,7 @@ class SnapshotManager:
             "faults": self._manager.faults.get_state(),
             "publisher": self._manager.publisher.get_state(),
             "transforms": self._manager.transforms.get_state(),
-            "nodes": keep_nodes(self._manager.nodes),
+            "nodes": save_nodes(self._manager.nodes),
             "digest": None if digest is None else digest.get_state(),
             "events": list(self._outlet.events),
             "latest": self._outlet.latest.get_state(),
@@ -173,10 +173,10 @@ class SnapshotManager:
             "radio": None if self._radio is None else self._radio.get_state(),
         }
 
-    def _put_back(self, state: dict[str, Any], reason: str) -> None:
+    def _restore_state(self, state: dict[str, Any], reason: str) -> None:
         self._manager.futures.fail_all(reason)
         self._manager.reseed(state["seed"])
-        put_back_nodes(self._manager.nodes, state["nodes"])
+        restore_nodes(self._manager.nodes, state["nodes"])
         self._grid_map.set_state(state["grid_map"])
         self._engine.set_state(state["engine"])
         self._graph.set_state(state["graph"])

@@ -255,14 +255,14 @@ class VectorizedSimulation(BatchCommands):
         """
         if envs is not None:
             chosen = self._chosen(envs)
-            for block, first, kept in zip(self._blocks, self._first, state[1:], strict=True):
+            for block, first, saved in zip(self._blocks, self._first, state[1:], strict=True):
                 here = chosen[(chosen >= first) & (chosen < first + len(block.seeds))]
                 if len(here):
-                    block.restore(here - first, kept)
+                    block.restore(here - first, saved)
             return
         self._owed_ns = state[0]
-        for block, kept in zip(self._blocks, state[1:], strict=True):
-            block.set_state(kept)
+        for block, saved in zip(self._blocks, state[1:], strict=True):
+            block.set_state(saved)
 
     def close(self) -> None:
         """Releases threads and scene memory; nothing can be simulated afterwards."""

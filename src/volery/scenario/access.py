@@ -76,12 +76,12 @@ class ScenarioAccess:
         folders += [Path()] if self._is_free(name) else []
         folders += [] if shipped is None else [shipped]
         for folder in folders:
-            place = folder / name
+            path = folder / name
             is_open = self._is_free(name) or (
-                _is_inner(name) and (folder is shipped or _is_below(place, folder))
+                _is_inner(name) and (folder is shipped or _is_below(path, folder))
             )
-            if is_open and _exists(place, exists):
-                return place
+            if is_open and _exists(path, exists):
+                return path
         if not self._is_free(name):
             raise DataFileError(
                 f"no {what} '{name[:80]}' that may be read: a scenario of a log or an upload "
@@ -103,16 +103,16 @@ def _is_inner(name: str) -> bool:
     return not (path.is_absolute() or ".." in path.parts)
 
 
-def _is_below(place: Path, folder: Path) -> bool:
+def _is_below(path: Path, folder: Path) -> bool:
     """Returns whether a path is below a folder when links are resolved."""
     try:
-        return place.resolve().is_relative_to(folder.resolve())
+        return path.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
         return False
 
 
-def _exists(place: Path, exists: Callable[[Path], bool]) -> bool:
+def _exists(path: Path, exists: Callable[[Path], bool]) -> bool:
     try:
-        return exists(place)
+        return exists(path)
     except (OSError, ValueError):  # too long, or no path at all
         return False

@@ -52,13 +52,13 @@ class Bounded(BaseModel):
         return value
 
 
-def implausible(data: BaseModel, place: str = "") -> tuple[str, str] | None:
+def implausible(data: BaseModel, prefix: str = "") -> tuple[str, str] | None:
     """Returns the first key with an invalid number, and the error; None: all are valid.
 
     For models that are not `Bounded`, which validate such numbers themselves.
     """
     for key in type(data).model_fields:
-        value, where = getattr(data, key), f"{place}.{key}" if place else key
+        value, where = getattr(data, key), f"{prefix}.{key}" if prefix else key
         if isinstance(value, BaseModel):
             inner = implausible(value, where)
             if inner is not None:

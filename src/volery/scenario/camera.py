@@ -68,7 +68,7 @@ class Daylight(Data):
     def _sun_has_one_source(self) -> Self:
         usual = type(self).model_fields
         angles = ("sun_elevation_deg", "sun_azimuth_deg")
-        told = any(getattr(self, name) != usual[name].default for name in angles)
-        if self.hour_of_day is not None and told:
+        has_angles = any(getattr(self, name) != usual[name].default for name in angles)
+        if self.hour_of_day is not None and has_angles:
             raise ValueError("hour_of_day replaces the sun's angles; leave them out")
         return self

@@ -39,9 +39,9 @@ def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = No
     `DataFileError`, listing the shipped names, if there is no such part.
     """
     if name.endswith(".toml"):
-        for place in ((folder or Path()) / name, Path(name)):
-            if place.is_file():
-                return place
+        for path in ((folder or Path()) / name, Path(name)):
+            if path.is_file():
+                return path
         raise DataFileError(f"no {what} file '{name}'")
     known = sorted(p.stem for p in shipped.glob("*.toml"))
     if name in known:

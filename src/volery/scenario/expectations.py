@@ -123,7 +123,7 @@ class SeparationExpectation(_Windowed):
     kind: Literal["separation"] = "separation"
     """Distance between UAVs."""
     at_least_m: Positive
-    """Least distance between the positions of two UAVs."""
+    """Minimum distance between the positions of two UAVs."""
 
     def _words(self) -> str:
         return f"separation >= {self.at_least_m:g} m"
@@ -135,7 +135,7 @@ class ClearanceExpectation(_Windowed):
     kind: Literal["clearance"] = "clearance"
     """Distance to trees and solids."""
     at_least_m: Annotated[float, Field(gt=0.0, le=10.0)]
-    """Least distance of a UAV's position from them; at most 10 m."""
+    """Minimum distance of a UAV's position from them; at most 10 m."""
 
     def _words(self) -> str:
         return f"clearance >= {self.at_least_m:g} m"
@@ -153,7 +153,7 @@ class LimitsExpectation(_Windowed):
     radius_m: Positive | None = None
     """Greatest horizontal distance from the middle line of the corridor."""
     height_m: Vector2 | None = None
-    """Least and greatest z, map."""
+    """Minimum and maximum z, map."""
 
     @model_validator(mode="after")
     def _has_limits(self) -> Self:
@@ -195,7 +195,7 @@ class BatteryExpectation(_Windowed):
     kind: Literal["battery"] = "battery"
     """Charge of the batteries."""
     at_least: _Fraction
-    """Least remaining fraction of the capacity."""
+    """Minimum remaining fraction of the capacity."""
 
     def _words(self) -> str:
         return f"battery >= {self.at_least:.0%}"
@@ -223,7 +223,7 @@ class TopicRateExpectation(_Windowed):
     topic: _Path
     """Absolute topic, or one below each UAV's namespace, such as `slam/pose`."""
     at_least_hz: Positive
-    """Least number of messages per simulated second, in each window."""
+    """Minimum number of messages per simulated second, in each window."""
     window_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 1.0
     """Length of the windows, which follow each other."""
 
@@ -246,7 +246,7 @@ class TopicValueExpectation(_Windowed):
     """Path of the field: `pose.position.z`; of text that is JSON, also the keys in it:
     `data.phase`."""
     at_least: float | None = None
-    """Least value of the field, over the window."""
+    """Minimum value of the field, over the window."""
     at_most: float | None = None
     """Greatest value of the field, over the window."""
     equals: bool | float | str | None = None
@@ -312,7 +312,7 @@ class NeesExpectation(_Expectation):
     """Greatest mean NEES of a UAV's positions, from the pose at its start; that of a consistent
     estimator is 3."""
     at_least: NonNegative = 0.0
-    """Least mean NEES; below it, covariances are too large."""
+    """Minimum mean NEES; below it, covariances are too large."""
 
     @model_validator(mode="after")
     def _bounds_are_ordered(self) -> Self:
@@ -345,7 +345,7 @@ class RealTimeFactorExpectation(_Expectation):
     kind: Literal["real_time_factor"] = "real_time_factor"
     """Speed of the simulation."""
     at_least: Positive
-    """Least simulated time per wall time, over the whole flight."""
+    """Minimum simulated time per wall time, over the whole flight."""
 
     def _words(self) -> str:
         return f"real-time factor >= {self.at_least:g}"

@@ -12,7 +12,7 @@ from volery.scenario.fault_texts import fault_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
-_MOST_SHOWN = 60
+_MAX_SHOWN = 60
 """Characters of a value in an error."""
 
 
@@ -76,7 +76,7 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
 def _short(value: str | float) -> str:
     """Returns a value for an error: a token, not the text of a file."""
     text = repr(value)
-    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
+    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
 def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:

@@ -118,10 +118,10 @@ class Wind(Data):
 
 
 def _check_end(key: str, gust: Gust, rise_s: float) -> None:
-    least = gust.start_s + 2.0 * rise_s
-    if gust.end_s is not None and gust.end_s < least - 1e-6:
+    min_end_s = gust.start_s + 2.0 * rise_s
+    if gust.end_s is not None and gust.end_s < min_end_s - 1e-6:
         raise ValueError(
-            f"{key} must leave time to rise and to fall: at least {least:g} s is needed"
+            f"{key} must leave time to rise and to fall: at least {min_end_s:g} s is needed"
         )
 
 

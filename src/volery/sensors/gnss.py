@@ -184,13 +184,13 @@ def _antennas(
 ) -> tuple[Array, Array]:
     """Returns antenna positions (S, 3) m and velocities (S, 3) m/s, mean over a physics step."""
     before_ns = max(time_ns - history.dt_ns, 0)
-    now = _places(history, rows, lever_body, time_ns)
-    before = _places(history, rows, lever_body, before_ns)
+    now = _antenna_positions(history, rows, lever_body, time_ns)
+    before = _antenna_positions(history, rows, lever_body, before_ns)
     elapsed_s = max(time_ns - before_ns, 1) / NS_PER_S
     return now, (now - before) / elapsed_s
 
 
-def _places(
+def _antenna_positions(
     history: PoseHistory, rows: NDArray[np.int64], lever_body: Array, time_ns: int
 ) -> Array:
     poses = np.array([pose_at(history, row, time_ns) for row in rows])

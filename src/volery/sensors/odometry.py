@@ -64,11 +64,11 @@ class OdometryBank(NoisyBank):
         """
         position = fleet.state.position_map[self._taken]
         attitude = fleet.state.attitude[self._taken]
-        way = position - self._last_position
-        moved = np.sqrt((way * way).sum(axis=1))
+        offset = position - self._last_position
+        moved = np.sqrt((offset * offset).sum(axis=1))
         self._last_position = position.copy()
         self._flown += moved
-        self._position_odom += rotations.rotate(self._yaw_turn(), way)
+        self._position_odom += rotations.rotate(self._yaw_turn(), offset)
         twist = _twist_body(fleet, self._rows)
         variance = np.zeros((len(self._rows), 6))
         if self._noise.enabled:

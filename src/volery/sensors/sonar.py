@@ -84,8 +84,8 @@ class SonarBank(NoisyBank):
 
 def _cone_directions(half_angle: float) -> Array:
     rays = []
-    for share, count in _RINGS:
-        off_axis = share * half_angle
+    for fraction, count in _RINGS:
+        off_axis = fraction * half_angle
         for i in range(count):
             around = 2.0 * math.pi * i / count
             rays.append(

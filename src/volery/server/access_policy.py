@@ -12,7 +12,7 @@ from volery.core.data_tables import read_table
 from volery.core.errors import BridgeError, CommandError
 from volery.runtime.services.control_authority import HAND_OVER, RELEASE, TAKE
 from volery.runtime.vehicles.control_authority import (
-    MOST_CHARACTERS,
+    MAX_CHARACTERS,
     ControlAuthority,
     operator_name,
     same_operator,
@@ -103,12 +103,12 @@ class OperatorPolicy:
     def _check_free(self, name: str, operation: Operation) -> None:
         """Raises BridgeError for a name below, about or moving a UAV of another operator."""
         try:
-            told = self._operators.moved_by(name)
-            about = {*parts_of(name), *told, *names_in(operation.get("args"))}
+            moved = self._operators.moved_by(name)
+            about = {*parts_of(name), *moved, *names_in(operation.get("args"))}
         except CommandError as error:
             raise BridgeError(str(error)) from None
         for uav in sorted(about):
-            holder = self._operators.holder_of(uav)
+            holder = self._operators.operator_of(uav)
             if holder and not same_operator(holder, self.name):
                 raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
 
@@ -123,15 +123,15 @@ class OperatorPolicy:
         called = args.get("operator")
         if isinstance(called, str) and called.strip() and not same_operator(called, self.name):
             called = operator_name(called)
-            if not 0 < len(called) <= MOST_CHARACTERS:
-                raise BridgeError(f"an operator's name has 1 to {MOST_CHARACTERS} characters")
+            if not 0 < len(called) <= MAX_CHARACTERS:
+                raise BridgeError(f"an operator's name has 1 to {MAX_CHARACTERS} characters")
             if service != TAKE or self._operators.held_by(self.name):
-                raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
+                raise BridgeError(f"you are {self.name}, not {called[:MAX_CHARACTERS]}")
             self._operator_names.rename(self.name, called)
             self.name = called
         to = args.get("to")
         if service == HAND_OVER and to not in self._operator_names:
-            raise BridgeError(f"no operator is called {str(to)[:MOST_CHARACTERS]!r} here")
+            raise BridgeError(f"no operator is called {str(to)[:MAX_CHARACTERS]!r} here")
         operation["args"] = {**args, "operator": self.name}
 
 

@@ -89,7 +89,7 @@ class AuthMiddleware:
             return
         headers = Headers(scope=scope)
         try:
-            self._check_place(scope, headers)
+            self._check_origin(scope, headers)
             visitor = await self._recognize(scope, headers, receive)
         except RefusedError as error:
             await _refuse(error, scope, receive, self._polite(send, None))
@@ -97,7 +97,7 @@ class AuthMiddleware:
         scope.setdefault("state", {})["role"] = visitor.role
         await self._app(scope, receive, self._polite(send, visitor.ticket))
 
-    def _check_place(self, scope: Scope, headers: Headers) -> None:
+    def _check_origin(self, scope: Scope, headers: Headers) -> None:
         """Refuses other sites' pages, and host names that only point to this machine."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if self._only_loopback and not self._origins.knows(host):

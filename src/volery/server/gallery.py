@@ -13,7 +13,7 @@ OWN = "Yours"
 
 
 class GalleryEntry(NamedTuple):
-    """Place of a shipped scenario among the cards."""
+    """Rank of a shipped scenario among the cards."""
 
     section: str
     title: str

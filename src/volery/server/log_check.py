@@ -51,8 +51,8 @@ def look_into(paths: Sequence[Path], *, play: bool = False) -> list[dict[str, An
 def main(what: str, *files: str) -> None:
     """Reads files and prints their summaries."""
     bound_this_process(BOUNDS)
-    told = [_of(Path(file), play=what == "play") for file in files]
-    sys.stdout.write(json.dumps(told))
+    results = [_of(Path(file), play=what == "play") for file in files]
+    sys.stdout.write(json.dumps(results))
 
 
 def _of(path: Path, *, play: bool) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.core.errors import BridgeError
-from volery.runtime.vehicles.control_authority import MOST_CHARACTERS, operator_key, operator_name
+from volery.runtime.vehicles.control_authority import MAX_CHARACTERS, operator_key, operator_name
 
 
 class OperatorNames:
@@ -20,7 +20,7 @@ class OperatorNames:
 
     def sign_in(self, wanted: str = "") -> str:
         """Reserves and returns a name: the wanted one if it is free, else one with a number."""
-        base = operator_name(wanted[: 4 * MOST_CHARACTERS])[: MOST_CHARACTERS - 5].strip()
+        base = operator_name(wanted[: 4 * MAX_CHARACTERS])[: MAX_CHARACTERS - 5].strip()
         number, name = 1, base or "operator 1"
         while name in self:
             number += 1

@@ -46,12 +46,12 @@ _REPEATS = RepeatFilter(bare=("Invalid UTF-8",))
 class PageServer:
     """Serves the page. Use it as a context manager, or call `start` and `stop`.
 
-    shelf: the scenarios of the cards; default: shipped ones and uploads.
+    catalog: the scenarios of the cards; default: shipped ones and uploads.
     """
 
-    def __init__(self, settings: PageSettings, shelf: ScenarioCatalog | None = None) -> None:
+    def __init__(self, settings: PageSettings, catalog: ScenarioCatalog | None = None) -> None:
         self._settings = settings
-        self._site = ServerState(settings.recordings, shelf or ScenarioCatalog(settings.uploads))
+        self._site = ServerState(settings.recordings, catalog or ScenarioCatalog(settings.uploads))
         self._site.unasked = settings.unasked
         self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
@@ -135,18 +135,20 @@ class PageServer:
         scenario = world.scenario
         name = log if scenario is None else scenario.name
         if not name:
-            told = ServerSituation(
+            situation = ServerSituation(
                 ServerActivity.FAILED if message else ServerActivity.NO_WORLD, message=message
             )
         else:
             what = "A recorded log." if scenario is None else scenario.description.strip()
-            told = ServerSituation(ServerActivity.FLYING, name, what, message)
-        self._call(self._site.join(world, told))
+            situation = ServerSituation(ServerActivity.FLYING, name, what, message)
+        self._call(self._site.join(world, situation))
         try:
             yield
         finally:
             self._leave(
-                ServerSituation(ServerActivity.BUILDING, told.scenario, told.description, message)
+                ServerSituation(
+                    ServerActivity.BUILDING, situation.scenario, situation.description, message
+                )
             )
 
     def stop(self) -> None:

@@ -21,21 +21,21 @@ from volery.server.replies import RefusedError
 from volery.server.request_bodies import check_operator, save_body
 from volery.server.server_state import ServerState
 
-MOST_BYTES = 2_000_000_000
+MAX_BYTES = 2_000_000_000
 """Max size of an uploaded log."""
 _SUFFIXES = (".mcap", ".bag")
 _NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)$")
 _WAITING = ".incoming_"
 _STILL_S = 3.0
 """A log changed within this time may still grow."""
-_MOST_KNOWN = 10_000
+_MAX_KNOWN = 10_000
 
 
 async def recordings(request: Request) -> Response:
     """Returns all logs of the folder, newest first."""
     site: ServerState = request.app.state.site
-    told = [] if site.recordings is None else await asyncio.to_thread(_listed, site.recordings)
-    return JSONResponse(told, headers={"Cache-Control": "no-store"})
+    listed = [] if site.recordings is None else await asyncio.to_thread(_listed, site.recordings)
+    return JSONResponse(listed, headers={"Cache-Control": "no-store"})
 
 
 async def recording(request: Request) -> Response:
@@ -61,12 +61,12 @@ async def bring_recording(request: Request) -> Response:
         raise RefusedError(415, f"logs are read from {', '.join(_SUFFIXES)}, not '{suffix[:20]}'")
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        most = min(MOST_BYTES, await asyncio.to_thread(room_left, folder))
+        max_bytes = min(MAX_BYTES, await asyncio.to_thread(room_left, folder))
     except RecordingError as error:
         raise RefusedError(507, str(error)) from None
     waiting = folder / f"{_WAITING}{id(request):x}{suffix}"
     try:
-        await save_body(request, waiting, most)
+        await save_body(request, waiting, max_bytes)
         lock: asyncio.Lock = request.app.state.upload_lock
         async with lock:  # one at a time
             (found,) = await asyncio.to_thread(look_into, [waiting], play=True)
@@ -115,9 +115,9 @@ class _Durations:
             fresh = [(path, _version(path)) for path in paths if not _may_be_growing(path)]
             fresh = [(path, version) for path, version in fresh if version not in self._known]
             found = look_into([path for path, _ in fresh])
-            for (_, version), told in zip(fresh, found, strict=True):
-                self._known[version] = told.get("seconds")
-            while len(self._known) > _MOST_KNOWN:
+            for (_, version), result in zip(fresh, found, strict=True):
+                self._known[version] = result.get("seconds")
+            while len(self._known) > _MAX_KNOWN:
                 self._known.popitem(last=False)
         finally:
             self._looking.release()

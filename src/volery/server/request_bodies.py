@@ -15,26 +15,26 @@ from volery.server.replies import RefusedError
 
 LONGEST_PAUSE_S = 30.0
 """Max time between two pieces of a body (modelling choice)."""
-LEAST_BYTES_S = 1000.0
+MIN_BYTES_S = 1000.0
 """Min average rate of a body, after the first such time (modelling choice)."""
 
 
-async def save_body(request: Request, path: Path, most_bytes: int) -> int:
+async def save_body(request: Request, path: Path, max_bytes: int) -> int:
     """Writes the body of a request to `path`; returns the number of bytes.
 
-    Raises RefusedError if it is empty, larger than `most_bytes`, or too slow; the written part
+    Raises RefusedError if it is empty, larger than `max_bytes`, or too slow; the written part
     remains.
     """
-    too_large = RefusedError(413, f"the file is larger than the limit of {_size(most_bytes)}")
+    too_large = RefusedError(413, f"the file is larger than the limit of {_size(max_bytes)}")
     announced = request.headers.get("content-length", "")
-    if announced.isdecimal() and int(announced) > most_bytes:
+    if announced.isdecimal() and int(announced) > max_bytes:
         raise too_large
     size = 0
     with path.open("xb") as file:
         try:
             async for chunk in _pieces_in_time(request):
                 size += len(chunk)
-                if size > most_bytes:
+                if size > max_bytes:
                     raise too_large
                 file.write(chunk)
         except OSError as error:
@@ -60,8 +60,8 @@ async def _pieces_in_time(request: Request) -> AsyncIterator[bytes]:
         yield piece
         size += len(piece)
         elapsed_s = time.monotonic() - began_s
-        if elapsed_s > LONGEST_PAUSE_S and size < LEAST_BYTES_S * elapsed_s:
-            raise RefusedError(408, f"the upload is slower than {LEAST_BYTES_S:g} bytes/s")
+        if elapsed_s > LONGEST_PAUSE_S and size < MIN_BYTES_S * elapsed_s:
+            raise RefusedError(408, f"the upload is slower than {MIN_BYTES_S:g} bytes/s")
 
 
 def check_operator(request: Request) -> None:

@@ -20,7 +20,7 @@ from volery.server.server_state import Client, JoinedWorld, ServerState
 
 _log = logging.getLogger(__name__)
 
-MOST_CLIENTS = 1000
+MAX_CLIENTS = 1000
 LONGEST_STALL_S = 60.0
 """Max time to send a frame to a client; pings detect a lost client earlier."""
 _TRY_AGAIN_LATER = 1013
@@ -59,7 +59,7 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
     if site.world is None:
         await websocket.close(SERVICE_RESTART, "the world is being built")
         return
-    if len(site.clients) >= MOST_CLIENTS:
+    if len(site.clients) >= MAX_CLIENTS:
         await websocket.close(_TRY_AGAIN_LATER, "too many clients")
         return
     world, address = site.world, websocket.client
@@ -107,11 +107,11 @@ async def _serve(
         authorized=True,
         gate=gate,
     )
-    conversation = asyncio.create_task(converse(channel, bell, peer, world.queue))
-    client = Client(channel, conversation)
+    session_task = asyncio.create_task(converse(channel, bell, peer, world.queue))
+    client = Client(channel, session_task)
     site.clients.add(client)
     try:
-        (problem,) = await asyncio.gather(conversation, return_exceptions=True)
+        (problem,) = await asyncio.gather(session_task, return_exceptions=True)
     finally:
         site.clients.discard(client)
     gone = (WebSocketDisconnect, OSError, TimeoutError, asyncio.CancelledError)

@@ -28,8 +28,8 @@ Card = dict[str, Any]
 async def scenarios(request: Request) -> Response:
     """Returns `./api/scenarios`: a card for each scenario, shipped ones first."""
     site: ServerState = request.app.state.site
-    told = await run_in_threadpool(cards_of, site.shelf)
-    return JSONResponse(told, headers={"Cache-Control": "no-store"})
+    cards = await run_in_threadpool(cards_of, site.catalog)
+    return JSONResponse(cards, headers={"Cache-Control": "no-store"})
 
 
 async def card_image(request: Request) -> Response:
@@ -41,14 +41,14 @@ async def card_image(request: Request) -> Response:
     return FileResponse(CARDS / f"{name}.jpg", headers=kept)
 
 
-def cards_of(shelf: ScenarioCatalog) -> list[Card]:
+def cards_of(catalog: ScenarioCatalog) -> list[Card]:
     """Returns the cards of all scenarios that can be read."""
     shipped = gallery()
     cards = [_card(_shipped(name), uploaded=False) | shipped[name]._asdict() for name in shipped]
-    cards += [_card(given, uploaded=False) for given in shelf.given()]
-    for name in shelf.added():
+    cards += [_card(given, uploaded=False) for given in catalog.given()]
+    for name in catalog.added():
         try:
-            cards.append(_card(shelf.load(name), uploaded=True))
+            cards.append(_card(catalog.load(name), uploaded=True))
         except VoleryError:
             continue
     return cards
@@ -61,7 +61,7 @@ def _shipped(name: str) -> Scenario:
 
 def _card(scenario: Scenario, *, uploaded: bool) -> Card:
     flown = [scenario.types[group.type] for group in scenario.uavs]
-    has_picture = not uploaded and (CARDS / f"{scenario.name}.jpg").is_file()
+    has_image = not uploaded and (CARDS / f"{scenario.name}.jpg").is_file()
     return {
         "name": scenario.name,
         "title": scenario.name,
@@ -72,7 +72,7 @@ def _card(scenario: Scenario, *, uploaded: bool) -> Card:
         "sensors": sorted({sensor.kind for kind in flown for sensor in kind.sensors}),
         "world": kind_of(scenario),
         "duration_s": scenario.duration_s,
-        "picture": f"./api/scenarios/{scenario.name}.jpg" if has_picture else None,
+        "picture": f"./api/scenarios/{scenario.name}.jpg" if has_image else None,
         "uploaded": uploaded,
         "missing": missing_packages(scenario),
     }

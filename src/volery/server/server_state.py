@@ -114,15 +114,15 @@ class Client:
     """One rosbridge client."""
 
     channel: WebSocketSession
-    conversation: asyncio.Task[Exception | None]
+    session_task: asyncio.Task[Exception | None]
 
     async def dismiss(self, reason: str) -> None:
         """Closes the connection with a request to reconnect; ignores an unresponsive client."""
         with suppress(Exception):
             async with asyncio.timeout(_FAREWELL_S):
                 await self.channel.close(SERVICE_RESTART, reason)
-        self.conversation.cancel()
-        await asyncio.gather(self.conversation, return_exceptions=True)
+        self.session_task.cancel()
+        await asyncio.gather(self.session_task, return_exceptions=True)
 
 
 @dataclass(eq=False)
@@ -131,10 +131,10 @@ class ServerState:
 
     recordings: Path | None = None
     """Folder of logs; None: no recordings."""
-    shelf: ScenarioCatalog = field(default_factory=ScenarioCatalog)
+    catalog: ScenarioCatalog = field(default_factory=ScenarioCatalog)
     """Scenarios that can be loaded; its folder is that of uploads."""
     unasked: bool = False
-    """Whether nobody has named the present scenario."""
+    """Whether no client has named the current scenario."""
     tensorboard: TensorBoardProcess | None = None
     """TensorBoard inside the page; None: there is none."""
     situation: ServerSituation = field(default_factory=ServerSituation)
@@ -150,7 +150,7 @@ class ServerState:
         """Disconnects all clients from the present world."""
         world, self.world, self.situation = self.world, None, situation
         self.unasked = self.unasked and world is None  # a world ends when another one is asked for
-        farewell = situation.message or "the world changes"
-        await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))
+        message = situation.message or "the world changes"
+        await asyncio.gather(*(client.dismiss(message) for client in tuple(self.clients)))
         if world is not None:
             world.leave()

@@ -27,6 +27,6 @@ class PageSettings:
     uploads: Path | None = None
     """Folder of uploaded scenarios; None: no uploads."""
     unasked: bool = False
-    """Whether nobody named the first scenario: the page then opens with the choice."""
+    """Whether no option named the first scenario: the page then opens with the choice."""
     tensorboard: Path | None = None
     """Folder of event files that TensorBoard shows; None: no TensorBoard."""

@@ -21,14 +21,14 @@ async def status(request: Request) -> Response:
 
 
 def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
-    told: dict[str, Any] = {
+    common: dict[str, Any] = {
         "version": version("volery"),
         "role": role,
         "token_needed": role is None,
     }
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
-        return nothing | {"title": "", "tensorboard": False, "unasked": False} | told
+        return nothing | {"title": "", "tensorboard": False, "unasked": False} | common
     now, world = site.situation, site.world
     geometry = None if world is None else world.geometry
     return {
@@ -40,5 +40,5 @@ def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
         "world": None if geometry is None else geometry.id,
         "tensorboard": site.tensorboard is not None,
         "unasked": site.unasked,
-        **told,
+        **common,
     }

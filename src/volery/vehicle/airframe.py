@@ -169,11 +169,11 @@ class Airframe(Table):
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
-        farthest = _max_distance(self)
-        if self.body.collision_radius_m < farthest - 1e-6:
+        max_distance = _max_distance(self)
+        if self.body.collision_radius_m < max_distance - 1e-6:
             raise ValueError(
                 f"body.collision_radius_m = {self.body.collision_radius_m} excludes feet or "
-                f"rotors; at least {farthest:.3f} is needed"
+                f"rotors; at least {max_distance:.3f} is needed"
             )
         if self.ground.landing_speed_limit_m_s <= self.limits.landing_m_s:
             raise ValueError(
@@ -204,10 +204,10 @@ class Airframe(Table):
 def wrench_matrix(airframe: Airframe) -> Array:
     """Returns force and torque (6, R) on the body, FLU, per newton of each rotor's thrust."""
     columns = []
-    for place in airframe.rotors.places:
-        axis = np.array(place.axis)
-        spin = 1.0 if place.direction == "ccw" else -1.0
-        torque = np.cross(place.position_m, axis) - spin * airframe.rotors.torque_m * axis
+    for rotor in airframe.rotors.places:
+        axis = np.array(rotor.axis)
+        spin = 1.0 if rotor.direction == "ccw" else -1.0
+        torque = np.cross(rotor.position_m, axis) - spin * airframe.rotors.torque_m * axis
         columns.append(np.concatenate([axis, torque]))
     return np.array(columns).T
 
@@ -228,8 +228,8 @@ def hover_thrusts(airframe: Airframe) -> Array:
 
 def _max_distance(airframe: Airframe) -> float:
     points = [math.hypot(*foot) for foot in airframe.ground.feet_m]
-    for place in airframe.rotors.places:
-        x, y, z = place.position_m
+    for rotor in airframe.rotors.places:
+        x, y, z = rotor.position_m
         points.append(math.hypot(math.hypot(x, y) + airframe.rotors.radius_m, z))
     return max(points)
 

@@ -178,11 +178,11 @@ def drain(body: Any, plant: Any, command: Any) -> bool:
 
 @inner_kernel
 def _open_circuit(battery: Any, charge: float) -> float:
-    place = charge * (OCV_POINTS - 1)
-    k = min(int(place), OCV_POINTS - 2)
-    share = place - k
+    position = charge * (OCV_POINTS - 1)
+    k = min(int(position), OCV_POINTS - 2)
+    fraction = position - k
     low, high = battery.open_circuit[k], battery.open_circuit[k + 1]
-    voltage: float = low + share * (high - low)
+    voltage: float = low + fraction * (high - low)
     return voltage
 
 

@@ -58,7 +58,7 @@ def body_shape(airframe: Airframe) -> BodyShape:
     for mesh, material in _pieces(airframe):
         pieces.setdefault(material, []).append(mesh)
     radius = airframe.rotors.radius_m
-    rotors = np.array([_turning(place, radius) for place in airframe.rotors.places])
+    rotors = np.array([_turning(rotor, radius) for rotor in airframe.rotors.places])
     discs = concatenate([_disc(rotor) for rotor in rotors])
     solid = ((concatenate(meshes), material) for material, meshes in pieces.items())
     return BodyShape((*solid, (discs, Material.ROTOR)), rotors)
@@ -66,8 +66,8 @@ def body_shape(airframe: Airframe) -> BodyShape:
 
 def _pieces(airframe: Airframe) -> Iterator[Piece]:
     yield from _hub(airframe)
-    for place in airframe.rotors.places:
-        yield from _arm(airframe, place)
+    for rotor in airframe.rotors.places:
+        yield from _arm(airframe, rotor)
     for foot in airframe.ground.feet_m:
         yield from _leg(airframe, np.array(foot))
 
@@ -84,23 +84,23 @@ def _hub(airframe: Airframe) -> Iterator[Piece]:
     yield _box([0.08 * x, 0.3 * y, 0.12 * z], [0.5 * x, 0.0, 0.02 * z]), front
 
 
-def _arm(airframe: Airframe, place: RotorGeometry) -> Iterator[Piece]:
+def _arm(airframe: Airframe, rotor: RotorGeometry) -> Iterator[Piece]:
     """Yields a bar from the body to below the rotor, the motor, and the cap above it."""
-    x, y, z = place.position_m
+    x, y, z = rotor.position_m
     radius, colours = airframe.rotors.radius_m, airframe.colours
     length = math.hypot(x, y)
-    seat = z - 0.16 * radius
-    start = [0.12 * x, 0.12 * y, min(seat, 0.18 * airframe.body.size_m[2])]
+    mount_z = z - 0.16 * radius
+    start = [0.12 * x, 0.12 * y, min(mount_z, 0.18 * airframe.body.size_m[2])]
     colour = colours.front if x > 0.01 * length else colours.back
-    yield _bar(start, [x, y, seat], 0.1 * length, 0.06 * length), MATERIAL_OF[colour]
+    yield _bar(start, [x, y, mount_z], 0.1 * length, 0.06 * length), MATERIAL_OF[colour]
     yield _cylinder(0.13 * radius, 0.22 * radius, [x, y, z - 0.12 * radius]), Material.UAV_GREY
     yield _cylinder(0.05 * radius, 0.1 * radius, [x, y, z + 0.02 * radius]), Material.UAV_WHITE
 
 
 def _leg(airframe: Airframe, foot: Array) -> Iterator[Piece]:
     """Yields a bar from the body down to a foot, and its pad."""
-    reach = max(math.hypot(*place.position_m[:2]) for place in airframe.rotors.places)
-    thick = 0.045 * reach
+    radius = max(math.hypot(*rotor.position_m[:2]) for rotor in airframe.rotors.places)
+    thick = 0.045 * radius
     legs = MATERIAL_OF[airframe.colours.legs]
     top = [0.7 * foot[0], 0.7 * foot[1], -0.1 * airframe.body.size_m[2]]
     yield _bar(top, foot + np.array([0.0, 0.0, 0.5 * thick]), thick, thick), legs
@@ -141,13 +141,13 @@ def _cylinder(radius: float, height: float, centre: ArrayLike) -> Mesh:
     return _mesh(points, np.vstack(triangles).astype(np.uint32))
 
 
-def _turning(place: RotorGeometry, radius: float) -> Array:
+def _turning(rotor: RotorGeometry, radius: float) -> Array:
     """Returns a row (10,) of `BodyShape.rotors`."""
-    axis = np.array(place.axis)
+    axis = np.array(rotor.axis)
     side = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)
-    other = np.cross(axis, side) * (1.0 if place.direction == "ccw" else -1.0)
-    return np.concatenate([place.position_m, side, other, [radius]])
+    other = np.cross(axis, side) * (1.0 if rotor.direction == "ccw" else -1.0)
+    return np.concatenate([rotor.position_m, side, other, [radius]])
 
 
 def _disc(rotor: Array) -> Mesh:

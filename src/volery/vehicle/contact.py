@@ -36,7 +36,7 @@ SWEEPS = 24
 _SETTLED = 1e-7
 _SLOP = 5e-4
 """Penetration that is not corrected, m."""
-_LIFT_SHARE = 0.1
+_LIFT_FRACTION = 0.1
 _LIFT_SPEED = 1.0
 """Maximum speed at which a point below the ground is lifted, m/s."""
 _TOUCHING = 2e-3
@@ -143,7 +143,7 @@ def _wanted_speed(plant: Any, gap: float, closing: float, rebounds: bool, dt: fl
     """Returns the minimum speed along the normal of a point after the step, m/s."""
     wanted = -gap / dt
     if gap < 0.0:
-        wanted = min(max(-gap - _SLOP, 0.0) * _LIFT_SHARE / dt, _LIFT_SPEED)
+        wanted = min(max(-gap - _SLOP, 0.0) * _LIFT_FRACTION / dt, _LIFT_SPEED)
     if closing > _REBOUND_SPEED and rebounds:
         wanted = max(wanted, plant.restitution * closing)
     return wanted
@@ -196,9 +196,9 @@ def _grip(plant: Any, row: Array, dx: float, dy: float, dz: float, slide: float)
     hold = slide / _ease(plant, wx, wy, wz)
     gx, gy, gz = row[_GRIP] - hold * dx, row[_GRIP + 1] - hold * dy, row[_GRIP + 2] - hold * dz
     size = math.sqrt(gx * gx + gy * gy + gz * gz)
-    most = plant.friction * row[_PUSH]
-    if size > most:
-        gx, gy, gz = gx * most / size, gy * most / size, gz * most / size
+    limit = plant.friction * row[_PUSH]
+    if size > limit:
+        gx, gy, gz = gx * limit / size, gy * limit / size, gz * limit / size
     fx, fy, fz = gx - row[_GRIP], gy - row[_GRIP + 1], gz - row[_GRIP + 2]
     row[_GRIP], row[_GRIP + 1], row[_GRIP + 2] = gx, gy, gz
     return fx, fy, fz

@@ -134,7 +134,7 @@ def _is_before(copy: int, x: float, y: float, z: float, other: Any) -> bool:
 
 
 @inner_kernel
-def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
+def _refill_budgets(uavs: Any, jets: Any, k: int, radius: float) -> None:
     """Divides the gap to each neighbour of UAV number `k` in order between the two UAVs.
 
     A closed gap is ignored: for UAVs `in_jet` the jets above are summed at every tick.
@@ -142,9 +142,9 @@ def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
     own = uavs[jets[k].row].body
     own.in_jet = False
     budget = 0.5 * _LOOK_BEYOND * _INVERSE_SLANT
-    first, last = _window(jets, k, reach)
+    first, last = _window(jets, k, radius)
     for n in range(first, last):
-        if n != k and abs(jets[n].y - jets[k].y) < reach:
+        if n != k and abs(jets[n].y - jets[k].y) < radius:
             r, s = _offset(jets, k, n)
             other = uavs[jets[n].row].body
             over, below = _gap(r, s, jets[n].radius), _gap(r, -s, jets[k].radius)
@@ -162,10 +162,10 @@ def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
 
 
 @inner_kernel
-def _jets_over(uavs: Any, models: Any, jets: Any, k: int, reach: float) -> float:
+def _jets_over(uavs: Any, models: Any, jets: Any, k: int, radius: float) -> float:
     """Returns the downward speed of the air at UAV number `k` in order, m/s, summed in order."""
     speed = 0.0
-    first, last = _window(jets, k, reach)
+    first, last = _window(jets, k, radius)
     for n in range(first, last):
         r, s = _offset(jets, k, n)
         if n != k and _gap(r, s, jets[n].radius) < 0.0:
@@ -215,13 +215,13 @@ def _offset(jets: Any, k: int, n: int) -> tuple[float, float]:
 
 
 @inner_kernel
-def _window(jets: Any, k: int, reach: float) -> tuple[int, int]:
-    """Returns the range in order of UAVs in the same copy within `reach` m in x of number `k`."""
+def _window(jets: Any, k: int, radius: float) -> tuple[int, int]:
+    """Returns the range in order of UAVs in the same copy within `radius` m in x of number `k`."""
     copy, x = jets[k].copy, jets[k].x
     first = k
-    while first > 0 and jets[first - 1].copy == copy and x - jets[first - 1].x <= reach:
+    while first > 0 and jets[first - 1].copy == copy and x - jets[first - 1].x <= radius:
         first -= 1
     last = k + 1
-    while last < len(jets) and jets[last].copy == copy and jets[last].x - x <= reach:
+    while last < len(jets) and jets[last].copy == copy and jets[last].x - x <= radius:
         last += 1
     return first, last

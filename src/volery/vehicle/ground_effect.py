@@ -30,7 +30,7 @@ from volery.world.terrain import TerrainGrid, terrain_height
 
 BODY_LIFT = 2.0
 """K_b (Sanchez-Cuevas et al. 2017)."""
-_LEAST_HEIGHT = 0.5
+_MIN_HEIGHT = 0.5
 """Minimum height in rotor radii."""
 _FADE_FROM, _FADE_TO = GROUND_FADE
 
@@ -38,7 +38,7 @@ _FADE_FROM, _FADE_TO = GROUND_FADE
 @inner_kernel
 def feels_ground(body: Any, plant: Any) -> bool:
     """Returns whether the ground may be near enough for its effect in this step."""
-    return bool(body.ground_budget < plant.ground_reach)
+    return bool(body.ground_budget < plant.max_ground_effect_height)
 
 
 @apart_kernel
@@ -69,32 +69,34 @@ def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: f
         lift = plant.thrust_constant * body.rotor_health[r]
         w = body.rotor_speed[r]
         induced = lift * w * w / (2.0 * AIR_DENSITY * area)  # v_i^2
-        share = induced / (induced + across + 1e-12)  # 1 / (1 + (V / v_i)^2), 0 for a rotor at rest
-        lift /= 1.0 - share * ground_share(plant, height)
+        fraction = induced / (
+            induced + across + 1e-12
+        )  # 1 / (1 + (V / v_i)^2), 0 for a rotor at rest
+        lift /= 1.0 - fraction * ground_fraction(plant, height)
         body.rotor_lift[r] = lift
         altered = altered or lift != plant.thrust_constant
     body.altered = altered
 
 
 @inner_kernel
-def ground_share(plant: Any, height: float) -> float:
+def ground_fraction(plant: Any, height: float) -> float:
     """Returns S of a rotor with its hub at `height` m above the ground, in hover, faded out."""
     radius = plant.rotor_radius
     if height >= _FADE_TO * radius:
         return 0.0
-    z = max(height, _LEAST_HEIGHT * radius)
+    z = max(height, _MIN_HEIGHT * radius)
     square = radius * radius
     far = 4.0 * z * z
-    share = square / (4.0 * far)
+    fraction = square / (4.0 * far)
     d = plant.adjacent_square
     if d > 0.0:
-        share += square * z * _inverse_cube(d + far)
-        share += 0.5 * square * z * _inverse_cube(2.0 * d + far)
-        share += 2.0 * BODY_LIFT * square * z * _inverse_cube(plant.opposite_square + far)
+        fraction += square * z * _inverse_cube(d + far)
+        fraction += 0.5 * square * z * _inverse_cube(2.0 * d + far)
+        fraction += 2.0 * BODY_LIFT * square * z * _inverse_cube(plant.opposite_square + far)
     up = (z / radius - _FADE_FROM) * (1.0 / (_FADE_TO - _FADE_FROM))
     if up > 0.0:
-        share *= 1.0 - up * up * (3.0 - 2.0 * up)
-    faded: float = share
+        fraction *= 1.0 - up * up * (3.0 - 2.0 * up)
+    faded: float = fraction
     return faded
 
 

@@ -107,7 +107,7 @@ IDENTIFIED = np.dtype(
         ("drag", "f8", 3),
         ("rate_limit", "f8"),
         ("yaw_rate_limit", "f8"),
-        ("most_thrust", "f8"),
+        ("max_thrust", "f8"),
         ("attitude_delay", "i8"),  # steps
         ("heave_delay", "i8"),
     ],
@@ -128,7 +128,7 @@ def identified_row(model: IdentifiedModel, airframe: Airframe, dt: float) -> NDA
     row["drag"] = model.drag_1_s
     row["rate_limit"] = math.radians(airframe.limits.rate_deg_s)
     row["yaw_rate_limit"] = math.radians(airframe.limits.yaw_rate_deg_s)
-    row["most_thrust"] = len(airframe.rotors.places) * airframe.max_rotor_thrust
+    row["max_thrust"] = len(airframe.rotors.places) * airframe.max_rotor_thrust
     row["attitude_delay"] = round(model.attitude_dead_time_s / dt)
     row["heave_delay"] = round(model.heave.dead_time_s / dt)
     return row
@@ -236,7 +236,7 @@ def _row_before(references: Array, now: int, delay: int) -> int:
 def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> float:
     """Returns the thrust at mid-step, N; stores it as the equal speed of all rotors."""
     whole = plant.thrust_constant * plant.rotors
-    wanted = min(max(model.heave_gain * wanted, 0.0), model.most_thrust)
+    wanted = min(max(model.heave_gain * wanted, 0.0), model.max_thrust)
     before = 0.0
     for r in range(plant.rotors):
         before += plant.thrust_constant * body.rotor_speed[r] * body.rotor_speed[r]
@@ -277,14 +277,14 @@ def _advance(
     """Advances one axis: `angle` rad to go to a reference that turns at `moving` rad/s."""
     before = body.omega_body[axis]
     lag = before - moving
-    way = (1.0 - loop[0]) * angle + loop[1] * lag + moving * dt
+    turn = (1.0 - loop[0]) * angle + loop[1] * lag + moving * dt
     rate = loop[3] * lag - loop[2] * angle + moving
-    way = min(max(way, -limit * dt), limit * dt)
+    turn = min(max(turn, -limit * dt), limit * dt)
     rate = min(max(rate, -limit), limit)
     body.omega_body[axis] = rate
     back = 1.0 / dt
-    # so that `carry`, which turns by the mean of both rates, turns by `way`
-    acceleration = 2.0 * back * (rate - back * way)
+    # so that `carry`, which turns by the mean of both rates, turns by `turn`
+    acceleration = 2.0 * back * (rate - back * turn)
     body.angular_acceleration_body[axis] = acceleration
     body.free_angular_acceleration[axis] = acceleration
 

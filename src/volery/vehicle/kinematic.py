@@ -96,10 +96,10 @@ def put(
         py - body.position_map[1],
         pz - body.position_map[2],
     )
-    way = math.sqrt(dx * dx + dy * dy + dz * dz)
-    body.ground_budget -= way
-    body.contact_budget -= way
-    body.separation_budget -= way
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    body.ground_budget -= distance
+    body.contact_budget -= distance
+    body.separation_budget -= distance
     back = 1.0 / dt
     body.acceleration_map[0] = back * (vx - body.velocity_map[0])
     body.acceleration_map[1] = back * (vy - body.velocity_map[1])

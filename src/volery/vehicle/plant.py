@@ -47,7 +47,7 @@ PLANT = np.dtype(
         ("jet_radius", "f8"),  # of the disc with the area of all rotors
         ("adjacent_square", "f8"),  # mean d^2 of neighbouring rotors of four; 0: not a quadrotor
         ("opposite_square", "f8"),  # mean b^2 of opposite ones
-        ("ground_reach", "f8"),
+        ("max_ground_effect_height", "f8"),
         ("battery", BATTERY),
         ("contacts", "i8"),
         ("contact_point", "f8", (MAX_CONTACTS, 3)),
@@ -94,8 +94,8 @@ def plant_of(
 def _fill_rotors(row: np.void, airframe: Airframe, dt: float, wear: Sequence[RotorWear]) -> None:
     rotors = airframe.rotors
     count = len(rotors.places)
-    position = np.array([place.position_m for place in rotors.places])
-    axis = np.array([place.axis for place in rotors.places])
+    position = np.array([rotor.position_m for rotor in rotors.places])
+    axis = np.array([rotor.axis for rotor in rotors.places])
     spin = np.array([1.0 if p.direction == "ccw" else -1.0 for p in rotors.places])
     torque = np.array([w.torque for w in wear] or [1.0] * count)
     lag = np.array([w.lag for w in wear] or [1.0] * count)
@@ -125,23 +125,23 @@ def _fill_rotors(row: np.void, airframe: Airframe, dt: float, wear: Sequence[Rot
 def _fill_neighbours(row: np.void, airframe: Airframe) -> None:
     """Sets the range of the ground effect, and the spacings of four rotors in one plane."""
     rotors = airframe.rotors
-    row["ground_reach"] = GROUND_FADE[1] * rotors.radius_m
+    row["max_ground_effect_height"] = GROUND_FADE[1] * rotors.radius_m
     if not (row["upright"] and row["rotors"] == 4):
         return
-    place = np.array([p.position_m[:2] for p in rotors.places])
-    place = place[np.argsort(np.arctan2(place[:, 1], place[:, 0]))]
-    row["adjacent_square"] = ((place - np.roll(place, 1, axis=0)) ** 2).sum(axis=1).mean()
-    row["opposite_square"] = ((place - np.roll(place, 2, axis=0)) ** 2).sum(axis=1).mean()
+    position = np.array([p.position_m[:2] for p in rotors.places])
+    position = position[np.argsort(np.arctan2(position[:, 1], position[:, 0]))]
+    row["adjacent_square"] = ((position - np.roll(position, 1, axis=0)) ** 2).sum(axis=1).mean()
+    row["opposite_square"] = ((position - np.roll(position, 2, axis=0)) ** 2).sum(axis=1).mean()
 
 
 def contact_points(airframe: Airframe) -> Array:
     """Returns contact points (P, 3) of the body: feet, rotor tips, roof; m, FLU."""
     points = [np.array(foot) for foot in airframe.ground.feet_m]
-    for place in airframe.rotors.places:
-        hub = np.array(place.position_m)
+    for rotor in airframe.rotors.places:
+        hub = np.array(rotor.position_m)
         arm = math.hypot(hub[0], hub[1])
-        reach = 1.0 + airframe.rotors.radius_m / arm if arm > 1e-6 else 1.0
-        points.append(hub * np.array([reach, reach, 1.0]))
+        scale = 1.0 + airframe.rotors.radius_m / arm if arm > 1e-6 else 1.0
+        points.append(hub * np.array([scale, scale, 1.0]))
     roof = max(airframe.body.size_m[2] / 2.0, *(p[2] for p in points))
     points.append(np.array([0.0, 0.0, roof]))
     return np.array(points)

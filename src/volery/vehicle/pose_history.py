@@ -15,7 +15,7 @@ from volery.core.compiled import inline_kernel
 
 KEPT_NS = 128_000_000
 """Duration of the history, ns: more than a turn of a 10 Hz scanner."""
-LEAST_LENGTH = 64
+MIN_LENGTH = 64
 
 
 class PoseHistory(NamedTuple):
@@ -31,7 +31,7 @@ class PoseHistory(NamedTuple):
 
 def new_history(position: ArrayLike, attitude: ArrayLike, dt_ns: int) -> PoseHistory:
     """Returns the history of a fleet at rest at `position` (N, 3) m, `attitude` (N, 4)."""
-    length = max(LEAST_LENGTH, -(-KEPT_NS // dt_ns))
+    length = max(MIN_LENGTH, -(-KEPT_NS // dt_ns))
     p = np.asarray(position, dtype=np.float64)
     q = np.asarray(attitude, dtype=np.float64)
     return PoseHistory(

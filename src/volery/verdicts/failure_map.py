@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from volery.core.arrays import Array
     from volery.results import FlightResult
 
-_REACH_M = 15.0
+_RADIUS_M = 15.0
 """Half the width of the part of the map that is drawn."""
 _INCHES, _DPI = 6.0, 110
 
@@ -39,8 +39,8 @@ def failure_png(flight: FlightResult, verdicts: Sequence[Verdict]) -> bytes:
     axes = figure.add_subplot()
     flight.plot(axes)
     x, y = float(position[0]), float(position[1])
-    axes.set_xlim(x - _REACH_M, x + _REACH_M)
-    axes.set_ylim(y - _REACH_M, y + _REACH_M)
+    axes.set_xlim(x - _RADIUS_M, x + _RADIUS_M)
+    axes.set_ylim(y - _RADIUS_M, y + _RADIUS_M)
     axes.plot([x], [y], "x", color="#d1242f", markersize=13, markeredgewidth=3, zorder=20)
     axes.set_title(f"{worst.uav} at {worst.time_s:.2f} s: {worst.name}", fontsize=9, wrap=True)
     file = io.BytesIO()

@@ -56,7 +56,7 @@ class _Robustness(NamedTuple):
 
 
 def formula(run: FinishedRun, expectation: FormulaExpectation) -> Finding:
-    """Judges by the UAV with the least robustness."""
+    """Judges by the UAV with the smallest robustness."""
     parsed, worst = parse_formula(expectation.formula), Finding("", math.inf)
     for row in rows_of(run.flight, expectation):
         signals = _Signals(run.flight, int(row))

@@ -11,9 +11,9 @@ from volery.core.arrays import Array
 from volery.results import FlightResult
 from volery.world.scene import Scene
 
-REACH_M = 10.0
+MAX_CLEARANCE_M = 10.0
 """Distance from obstacles beyond which it does not count, m."""
-_LOOK_M = 4.0 * REACH_M
+_LOOK_M = 4.0 * MAX_CLEARANCE_M
 """Distance up to which obstacles are searched: far from them, long paths are skipped."""
 _CELL_M = 0.5
 
@@ -22,7 +22,7 @@ class NearestObstacle(NamedTuple):
     """The moment at which a UAV is nearest to trees and solids."""
 
     distance_m: float
-    """Distance of the UAV's position less its radius, m, at most `REACH_M` less it."""
+    """Distance of the UAV's position less its radius, m, at most `MAX_CLEARANCE_M` less it."""
     uav: int
     """Number of the UAV in the flight; -1: no UAV was in the air."""
     sample: int
@@ -65,7 +65,7 @@ def nearest_obstacle(
         found = scene.clearance(points, _LOOK_M, include_terrain=False).distance
         radii = radius[[path.row for path in paths]]
         gaps = np.minimum(found, _LOOK_M) - radii
-        counted = np.minimum(gaps, REACH_M - radii)
+        counted = np.minimum(gaps, MAX_CLEARANCE_M - radii)
         k = int(np.argmin(counted))
         if counted[k] < best.distance_m:
             path = paths[k]
@@ -134,11 +134,13 @@ def area_m2(paths: Array, radius_m: float = 2.0) -> float:
     cells = np.unique(np.concatenate([_cells(path) for path in paths]), axis=0)
     if not len(cells):
         return 0.0
-    reach = int(np.ceil(radius_m / _CELL_M))
-    offsets = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2), axis=-1).reshape(-1, 2)
+    radius_cells = int(np.ceil(radius_m / _CELL_M))
+    offsets = np.stack(
+        np.meshgrid(*[np.arange(-radius_cells, radius_cells + 1)] * 2), axis=-1
+    ).reshape(-1, 2)
     offsets = offsets[np.linalg.norm(offsets, axis=1) * _CELL_M <= radius_m]
-    low = cells.min(axis=0) - reach
-    size = cells.max(axis=0) + reach + 1 - low
+    low = cells.min(axis=0) - radius_cells
+    size = cells.max(axis=0) + radius_cells + 1 - low
     covered = np.zeros(size, np.bool_)
     for offset in offsets:
         x, y = (cells + offset - low).T

@@ -189,12 +189,12 @@ def speed(run: FinishedRun, expectation: SpeedExpectation) -> Finding:
 
 def battery(run: FinishedRun, expectation: BatteryExpectation) -> Finding:
     """Judges by the lowest charge."""
-    least = expectation.at_least
+    min_charge = expectation.at_least
     return _worst_sample(
         run,
         expectation,
-        lambda flight, rows, samples: flight.battery_charge[np.ix_(rows, samples)] - least,
-        lambda margin: f"{least + margin:.1%}",
+        lambda flight, rows, samples: flight.battery_charge[np.ix_(rows, samples)] - min_charge,
+        lambda margin: f"{min_charge + margin:.1%}",
         "",
     )
 
@@ -241,7 +241,7 @@ def _worst_sample(
     words: Callable[[float], str],
     unit: str,
 ) -> Finding:
-    """Judges by the sample of a UAV with the least margin; margins: (rows, samples)."""
+    """Judges by the sample of a UAV with the smallest margin; margins: (rows, samples)."""
     flight, rows = run.flight, rows_of(run.flight, expectation)
     samples = samples_of(flight, expectation.from_s, expectation.until_s)
     found = _existing(margins(flight, rows, samples), np.inf)

@@ -78,7 +78,7 @@ def near_bodies(
     bodies: BodyTable,
     low: tuple[float, float, float],
     high: tuple[float, float, float],
-    reach: float,
+    max_range: float,
     uav: int,
     near: NDArray[np.int32],
 ) -> int:
@@ -86,7 +86,7 @@ def near_bodies(
 
     low, high: corners of the box, m, map. uav: the row of the rays' UAV; -1 for rays of no UAV.
     """
-    return near_bodies_of_several(bodies, low, high, reach, uav, uav, near)
+    return near_bodies_of_several(bodies, low, high, max_range, uav, uav, near)
 
 
 @inner_kernel
@@ -94,7 +94,7 @@ def near_bodies_of_several(
     bodies: BodyTable,
     low: tuple[float, float, float],
     high: tuple[float, float, float],
-    reach: float,
+    max_range: float,
     first_uav: int,
     last_uav: int,
     near: NDArray[np.int32],
@@ -120,7 +120,7 @@ def near_bodies_of_several(
             a, b = bodies.start[i, j], bodies.end[i, j]
             gap = max(low[j] - max(a, b), min(a, b) - high[j], 0.0)
             squared += gap * gap
-        limit = reach + bodies.radius[i]
+        limit = max_range + bodies.radius[i]
         if squared <= limit * limit:
             near[count] = i
             count += 1
@@ -133,21 +133,21 @@ def _may_touch(
 ) -> bool:
     """Returns whether a packet's lanes may hit the sphere; false is always exact."""
     m = lanes // 2
-    shift, spread, reach = 0.0, 0.0, 0.0
+    shift, spread, max_range = 0.0, 0.0, 0.0
     for k in range(lanes):
         s, d = 0.0, 0.0
         for row in range(3):
             s += abs(rays[ORIGIN + row, k] - rays[ORIGIN + row, m])
             d += abs(rays[DIRECTION + row, k] - rays[DIRECTION + row, m])
         shift, spread = max(shift, s), max(spread, d)
-        reach = max(reach, rays[FAR, k])
+        max_range = max(max_range, rays[FAR, k])
     cx = x - rays[ORIGIN, m]
     cy = y - rays[ORIGIN + 1, m]
     cz = z - rays[ORIGIN + 2, m]
     along = cx * rays[DIRECTION, m] + cy * rays[DIRECTION + 1, m] + cz * rays[DIRECTION + 2, m]
     away = cx * cx + cy * cy + cz * cz
     slack = radius + shift + spread * (np.sqrt(away) + radius + shift)
-    if along < -slack or along > reach + slack:
+    if along < -slack or along > max_range + slack:
         return False
     return bool(away - along * along <= slack * slack)
 

@@ -132,7 +132,7 @@ class EmbreeBackend:
         workers: Workers,
         origins: NDArray[np.float64],
         directions: NDArray[np.float64],
-        reach: float,
+        max_range: float,
         exclude: NDArray[np.int32],
         fraction: float,
         out: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], NDArray[np.uint8]],
@@ -142,7 +142,9 @@ class EmbreeBackend:
 
         def work() -> None:
             block = thread_block(CHUNK, bodies)
-            cast_rays(handle, origins, directions, reach, exclude, fraction, counter, block, *out)
+            cast_rays(
+                handle, origins, directions, max_range, exclude, fraction, counter, block, *out
+            )
 
         workers.run(work, alone=len(origins) <= FEW_RAYS)
 
@@ -168,7 +170,7 @@ class EmbreeBackend:
     def clearance(
         self,
         points: NDArray[np.float64],
-        reach: float,
+        max_distance: float,
         include_terrain: bool,
         out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
     ) -> None:
@@ -176,7 +178,7 @@ class EmbreeBackend:
         scenes, tables = self.query_rows(include_terrain)
         memory = query_memory()
         nearest_points(
-            scenes, callback_address(), tables, ONE_WORLD.world, points, reach, memory, *out
+            scenes, callback_address(), tables, ONE_WORLD.world, points, max_distance, memory, *out
         )
 
     def query_rows(self, include_terrain: bool) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

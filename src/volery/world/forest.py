@@ -157,7 +157,7 @@ def procedural_forest(
     Raises `ScenarioError` if the trees do not fit, or for an unknown species.
     """
     _check(region)
-    shares = _shares(species)
+    fractions = _fractions(species)
     if (trees is None) == (density_per_ha is None):
         raise ScenarioError("a procedural forest needs either trees or density_per_ha")
     area = (region[2] - region[0]) * (region[3] - region[1])
@@ -165,12 +165,12 @@ def procedural_forest(
     if count < 0 or not minimum_spacing_m >= 0.0:
         raise ScenarioError("the number of trees and their minimum spacing must not be negative")
     position = _throw(region, count, minimum_spacing_m, generator(seed, "forest/position"))
-    names = np.array(list(shares), dtype=object)
+    names = np.array(list(fractions), dtype=object)
     picks = generator(seed, "forest/species").random(count)
-    kind = np.searchsorted(np.cumsum(list(shares.values())), picks, side="right")
+    kind = np.searchsorted(np.cumsum(list(fractions.values())), picks, side="right")
     chosen = names[np.minimum(kind, len(names) - 1)]
     dbh, height = np.full(count, np.nan), np.full(count, np.nan)
-    for name in sorted(shares):
+    for name in sorted(fractions):
         _draw_missing(
             load_species(name), np.flatnonzero(chosen == name), dbh, height, seed, diameters
         )
@@ -193,18 +193,18 @@ def _check(region: Region) -> None:
         raise ScenarioError(f"a forest's region must be x0 < x1 and y0 < y1, not {region}")
 
 
-def _shares(species: Mapping[str, float] | Sequence[str] | str) -> dict[str, float]:
+def _fractions(species: Mapping[str, float] | Sequence[str] | str) -> dict[str, float]:
     if isinstance(species, str):
         species = [species]
     mix = dict(species) if isinstance(species, Mapping) else dict.fromkeys(species, 1.0)
-    for name, share in mix.items():
+    for name, fraction in mix.items():
         load_species(name)
-        if not (math.isfinite(share) and share > 0.0):
-            raise ScenarioError(f"the share of species {name!r} must be above 0, not {share}")
+        if not (math.isfinite(fraction) and fraction > 0.0):
+            raise ScenarioError(f"the share of species {name!r} must be above 0, not {fraction}")
     if not mix:
         raise ScenarioError("a procedural forest needs at least one species")
     total = sum(mix.values())
-    return {name: share / total for name, share in mix.items()}
+    return {name: fraction / total for name, fraction in mix.items()}
 
 
 def _draw_missing(
@@ -283,8 +283,8 @@ def _assemble(
         shape = np.minimum(
             (variant[rows] * species.variants).astype(np.int64), species.variants - 1
         )
-        used, place = np.unique(size_class * species.variants + shape, return_inverse=True)
-        index[rows] = len(models) + place
+        used, index_of_row = np.unique(size_class * species.variants + shape, return_inverse=True)
+        index[rows] = len(models) + index_of_row
         models.extend(grown[k] for k in used)
     scale = _scales(models, index, dbh, height)
     x, y = position.T

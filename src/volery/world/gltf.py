@@ -49,8 +49,8 @@ def glb_of(
         meshes = [file.add_mesh(surfaces) for surfaces in _tree_surfaces(forest, detail)]
         placed = (rows.tolist() for rows in _placed(forest))
         trees = zip(forest.model_index.tolist(), *placed, strict=True)
-        for number, (model, place, turn, scale) in enumerate(trees, start=1):
-            placing = {"translation": place, "rotation": turn, "scale": scale}
+        for number, (model, position, turn, scale) in enumerate(trees, start=1):
+            placing = {"translation": position, "rotation": turn, "scale": scale}
             file.add_node(f"tree {number}", meshes[model], **placing)
     for solid in solids:
         file.add_node(solid.name, file.add_mesh(_parts_of(solid)))
@@ -85,10 +85,10 @@ def instanced_glb_of(
     return file.content()
 
 
-class _Placed(NamedTuple):
+class _Instance(NamedTuple):
     """Poses and scales of trees, in glTF's axes."""
 
-    places: NDArray[np.float64]
+    positions: NDArray[np.float64]
     turns: NDArray[np.float64]
     scales: NDArray[np.float64]
 
@@ -129,10 +129,10 @@ def _grained(mesh: Mesh) -> Mesh:
     return Mesh((steps * _GRAIN_M).astype(np.float32), mesh.triangles)
 
 
-def _placed(forest: Forest) -> _Placed:
+def _placed(forest: Forest) -> _Instance:
     half = 0.5 * forest.yaw
     zero = np.zeros_like(half)
-    return _Placed(
+    return _Instance(
         gltf_from_enu(forest.position_map).round(_DIGITS),
         q_gltf_from_enu(np.stack([zero, zero, np.sin(half), np.cos(half)], -1)),
         np.abs(gltf_from_enu(forest.scale)),

@@ -73,9 +73,9 @@ _NAMES = {int: "an integer", list: "a list", dict: "an object", str: "text"}
 class Container:
     """A file's JSON, and the arrays that its accessors describe."""
 
-    def __init__(self, path: Path, most_bytes: int) -> None:
+    def __init__(self, path: Path, max_bytes: int) -> None:
         self._folder = path.parent
-        self._bytes_left = most_bytes
+        self._bytes_left = max_bytes
         self._buffers: dict[int, bytes] = {}
         data = path.read_bytes()
         if data.startswith(_MAGIC):
@@ -119,8 +119,8 @@ class Container:
             raise ValueError(f"accessor {number} has no data")
         if "sparse" in accessor:
             found = self._replaced(found, field(accessor, "sparse", dict))
-        is_share = accessor.get("normalized", False) and kind.kind != "f"
-        if not is_share:
+        is_fraction = accessor.get("normalized", False) and kind.kind != "f"
+        if not is_fraction:
             return found
         return np.asarray(np.maximum(found / np.float64(np.iinfo(kind).max), -1.0))
 
@@ -200,10 +200,10 @@ class Container:
     def _replaced(self, found: NDArray[Any], sparse: dict[str, Any]) -> NDArray[Any]:
         """Returns the array with some of its elements replaced."""
         count = field(sparse, "count", int)
-        places, values = field(sparse, "indices", dict), field(sparse, "values", dict)
+        indices, values = field(sparse, "indices", dict), field(sparse, "values", dict)
         if not 0 <= count <= len(found):
             raise ValueError(f"{count} of {len(found)} elements are replaced")
-        at = self._elements(places, count, _component(places), 1)[:, 0]
+        at = self._elements(indices, count, _component(indices), 1)[:, 0]
         if count and not (at.dtype.kind == "u" and at.max() < len(found)):
             raise ValueError("a replaced element does not exist")
         changed = found.copy()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from volery.core.frames import gltf_from_enu
 from volery.world.ground_cover import GroundCover
-from volery.world.ground_cover_image import cover_places, cover_png
+from volery.world.ground_cover_image import cover_coordinates, cover_png
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.scene_content import PLAIN, Look
@@ -54,11 +54,11 @@ class _Stretch(Enum):
     POINTS = (12, _VERTICES)
     NUMBERS = (4, _INDICES)
     SHORT_NUMBERS = (2, _INDICES)
-    PLACES = (8, _VERTICES)
+    TEXTURE_COORDINATES = (8, _VERTICES)
     COLOURS = (4, _VERTICES)
     PLACINGS = (12, None)
     TURNS = (16, None)
-    PICTURE = (1, None)
+    IMAGE = (1, None)
 
 
 class GltfFile:
@@ -89,15 +89,15 @@ class GltfFile:
         self,
         name: str,
         mesh: int | None,
-        places: NDArray[np.floating],
+        positions: NDArray[np.floating],
         turns: NDArray[np.floating],
         scales: NDArray[np.floating],
     ) -> None:
         """Adds instances of a mesh: positions (N, 3), turns (N, 4), scales (N, 3), glTF's axes."""
-        if mesh is None or not len(places):
+        if mesh is None or not len(positions):
             return
         attributes = {
-            "TRANSLATION": self._add_rows(_Stretch.PLACINGS, places, _FLOAT, "VEC3"),
+            "TRANSLATION": self._add_rows(_Stretch.PLACINGS, positions, _FLOAT, "VEC3"),
             "ROTATION": self._add_rows(_Stretch.TURNS, turns, _FLOAT, "VEC4"),
             "SCALE": self._add_rows(_Stretch.PLACINGS, scales, _FLOAT, "VEC3"),
         }
@@ -121,9 +121,9 @@ class GltfFile:
             normals = np.round(gltf_from_enu(mesh.vertex_normals) * _NORMAL_STEPS) / _NORMAL_STEPS
             attributes["NORMAL"] = self._add_rows(_Stretch.POINTS, normals, _FLOAT, "VEC3")
         if surface.colours is not None:
-            shares = np.pad(surface.colours, ((0, 0), (0, 1)), constant_values=1.0)
+            factors = np.pad(surface.colours, ((0, 0), (0, 1)), constant_values=1.0)
             attributes["COLOR_0"] = self._add_rows(
-                _Stretch.COLOURS, np.round(255.0 * shares.clip(0.0, 1.0)), _UINT8, "VEC4"
+                _Stretch.COLOURS, np.round(255.0 * factors.clip(0.0, 1.0)), _UINT8, "VEC4"
             )
             self._accessors[-1]["normalized"] = True
         if surface.storeys is not None:
@@ -140,10 +140,10 @@ class GltfFile:
         """Textures mesh number `number`, made of `mesh`, with the ground's cover."""
         if number is None:
             return
-        self._stretches[_Stretch.PICTURE] = [cover_png(cover, self._colours)]
+        self._stretches[_Stretch.IMAGE] = [cover_png(cover, self._colours)]
         primitive = self._meshes[number]["primitives"][0]
         primitive["attributes"]["TEXCOORD_0"] = self._add_rows(
-            _Stretch.PLACES, cover_places(cover, mesh.vertices), _FLOAT, "VEC2"
+            _Stretch.TEXTURE_COORDINATES, cover_coordinates(cover, mesh.vertices), _FLOAT, "VEC2"
         )
         primitive["material"] = len(self._materials)
         self._materials.append(
@@ -231,10 +231,10 @@ class GltfFile:
                 "bufferViews": views,
                 "buffers": [{"byteLength": len(data)}],
             }
-            if _Stretch.PICTURE in numbers:
-                picture = numbers[_Stretch.PICTURE]
+            if _Stretch.IMAGE in numbers:
+                image = numbers[_Stretch.IMAGE]
                 document |= {
-                    "images": [{"bufferView": picture, "mimeType": "image/png"}],
+                    "images": [{"bufferView": image, "mimeType": "image/png"}],
                     "samplers": [{"wrapS": _CLAMP, "wrapT": _CLAMP}],
                     "textures": [{"sampler": 0, "source": 0}],
                 }

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.world.gltf_container import Container, entry, field, numbers
 from volery.world.gltf_nodes import (
-    MOST_INSTANCES,
+    MAX_INSTANCES,
     READ_EXTENSIONS,
     ShownPrimitive,
     shown_primitives,
 )
 
-MOST_PARTS = 100_000
+MAX_PARTS = 100_000
 """Maximum number of meshes in nodes, each counted as often as used."""
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _HARMLESS = (
@@ -50,9 +50,9 @@ class Part(NamedTuple):
     colour: Array | None
 
 
-def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
+def read_gltf(path: Path, max_bytes: int, max_triangles: int) -> list[Part]:
     """Returns all parts of the file's scene; raises `ValueError` without the file's name."""
-    file = Container(path, most_bytes)
+    file = Container(path, max_bytes)
     required = field(file.document, "extensionsRequired", list, [])
     for name in required:
         if not str(name).startswith(_HARMLESS) and name not in READ_EXTENSIONS:
@@ -68,13 +68,13 @@ def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
         triangles += _triangle_count(file, primitive) * len(transforms)
         points += corners * (len(transforms) + int(np.count_nonzero(weights)))
         instances += len(transforms)
-        if triangles > most_triangles or points > 3 * most_triangles:
+        if triangles > max_triangles or points > 3 * max_triangles:
             raise ValueError(
-                f"its nodes show more than {most_triangles:,} triangles, or corners of so many"
+                f"its nodes show more than {max_triangles:,} triangles, or corners of so many"
             )
-        if len(shown) > MOST_PARTS or instances > MOST_INSTANCES:
+        if len(shown) > MAX_PARTS or instances > MAX_INSTANCES:
             raise ValueError(
-                f"its nodes show more than {MOST_PARTS:,} parts, or {MOST_INSTANCES:,} instances"
+                f"its nodes show more than {MAX_PARTS:,} parts, or {MAX_INSTANCES:,} instances"
             )
     return [_part(file, each) for each in shown]
 

@@ -17,7 +17,7 @@ from volery.world.gltf_container import Container, entry, field, numbers
 
 READ_EXTENSIONS = ("KHR_node_visibility", "EXT_mesh_gpu_instancing")
 """Extensions of nodes that are applied."""
-MOST_INSTANCES = 1_000_000
+MAX_INSTANCES = 1_000_000
 """Maximum number of instances of one node."""
 _VISIBILITY, _INSTANCING = READ_EXTENSIONS
 
@@ -94,10 +94,10 @@ def _instances(file: Container, node: dict[str, Any]) -> Array:
     counts = {file.count(number) for number in attributes.values()}
     if not counts:
         return np.eye(4)[None]
-    if len(counts) > 1 or max(counts) > MOST_INSTANCES:
+    if len(counts) > 1 or max(counts) > MAX_INSTANCES:
         raise ValueError(
             f"attributes of a node's instances have {sorted(counts)} elements; they need one "
-            f"number of at most {MOST_INSTANCES:,}"
+            f"number of at most {MAX_INSTANCES:,}"
         )
 
     def rows(name: str, form: str, default: Sequence[float]) -> Array:

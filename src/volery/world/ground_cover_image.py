@@ -41,7 +41,7 @@ def cover_png(cover: GroundCover, colours: Mapping[Material, tuple[float, float,
     )
 
 
-def cover_places(cover: GroundCover, points: NDArray[np.floating]) -> NDArray[np.float32]:
+def cover_coordinates(cover: GroundCover, points: NDArray[np.floating]) -> NDArray[np.float32]:
     """Returns image coordinates (n, 2), fractions of width and height, of points (n, 3), m, map."""
     rows, columns = cover.material.shape
     low = np.array([cover.origin_x, cover.origin_y]) - _RIM * cover.spacing

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.core.text_tables import is_not_measured, number_in, read_table
+from volery.world.inventory_checks import warn_of_units
 from volery.world.inventory_columns import REQUIRED, ColumnOf, columns_of
-from volery.world.inventory_doubts import question
 
 _MARKS = (-999.0, -9999.0, -99999.0)
 """Numbers that stand for values that were not measured."""
@@ -94,7 +94,7 @@ def read_inventory(path: str | Path) -> Inventory:
         plural = "row" if len(faults) == 1 else "rows"
         raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
     measured = np.array(numbers, dtype=np.float64).reshape(-1, 4)
-    question(f"inventory {path.name}", np.array(sound, dtype=np.int64), measured)
+    warn_of_units(f"inventory {path.name}", np.array(sound, dtype=np.int64), measured)
     return Inventory(measured[:, :2], measured[:, 2], measured[:, 3], tuple(names))
 
 

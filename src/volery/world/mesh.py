@@ -92,9 +92,9 @@ class Mesh:
         a, b, c = same.reshape(-1)[self.triangles].T
         edges = np.concatenate([np.stack(pair, axis=1) for pair in ((a, b), (b, c), (c, a))])
         edges = edges[edges[:, 0] != edges[:, 1]]
-        ways, counts = np.unique(edges, axis=0, return_counts=True)
+        directed, counts = np.unique(edges, axis=0, return_counts=True)
         back, others = np.unique(edges[:, ::-1], axis=0, return_counts=True)
-        return bool(np.array_equal(ways, back) and np.array_equal(counts, others))
+        return bool(np.array_equal(directed, back) and np.array_equal(counts, others))
 
     def transformed(self, transform: ArrayLike) -> Mesh:
         """Returns the mesh in another frame; `transform` is (3, 4) or (4, 4): new point = M p + t.

@@ -22,17 +22,17 @@ from volery.world.mesh import Mesh
 from volery.world.obj_import import read_obj
 from volery.world.stl_import import read_stl
 
-MOST_BYTES = 128_000_000
-MOST_TRIANGLES = 5_000_000
+MAX_BYTES = 128_000_000
+MAX_TRIANGLES = 5_000_000
 """Maximum number of triangles: 5 million take about 1 GB in the ray caster."""
-FARTHEST_M = 100_000.0
+MAX_DISTANCE_M = 100_000.0
 """Maximum distance of placed vertices, which larger scale errors exceed; beyond, 32-bit numbers are
 coarser than 4 mm. A file's own coordinates may be larger."""
 _LARGEST = 1e15
 """Maximum coordinate in a file's units; products of three of them fit 64-bit numbers."""
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
 _GLTF = (".glb", ".gltf")
-_MOST_MATERIAL_BYTES = 4_000_000
+_MAX_MATERIAL_BYTES = 4_000_000
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -79,9 +79,9 @@ def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshF
         size = path.stat().st_size
     except OSError as error:
         raise DataFileError(f"mesh {path} cannot be read: {error.strerror}") from None
-    if size > MOST_BYTES:
+    if size > MAX_BYTES:
         raise DataFileError(
-            f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB are read"
+            f"{path} has {size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are read"
         )
     parts = _load(path, kind)
     count = sum(len(part.triangles) for part in parts)
@@ -102,14 +102,14 @@ def _load(path: Path, kind: str) -> list[Part]:
     try:
         if kind in _GLTF:
             with np.errstate(all="ignore"):
-                return read_gltf(path, MOST_BYTES, MOST_TRIANGLES)
+                return read_gltf(path, MAX_BYTES, MAX_TRIANGLES)
         data = path.read_bytes()
         if kind == ".stl":
-            return read_stl(data, MOST_TRIANGLES)
-        return read_obj(data, _Materials(path.parent).get, MOST_TRIANGLES)
+            return read_stl(data, MAX_TRIANGLES)
+        return read_obj(data, _Materials(path.parent).get, MAX_TRIANGLES)
     except Exception as error:  # broken files raise any exception
-        told = " ".join(str(error).split())[:200] or type(error).__name__
-        raise DataFileError(f"{path} cannot be read as a mesh: {told}") from None
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise DataFileError(f"{path} cannot be read as a mesh: {reason}") from None
 
 
 class _Materials:
@@ -124,7 +124,7 @@ class _Materials:
         is_material = path.suffix.lower() == ".mtl" and path.is_file()
         if not (is_material and path.is_relative_to(self._folder.resolve())):
             raise FileNotFoundError(name)
-        if path.stat().st_size > _MOST_MATERIAL_BYTES:
+        if path.stat().st_size > _MAX_MATERIAL_BYTES:
             raise OSError(f"{name} is too large")
         return path.read_bytes()
 

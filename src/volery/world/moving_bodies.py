@@ -77,9 +77,9 @@ def with_blades(
 
     start, end: (N, R or more) rad, rotor angles at either end of the interval.
     """
-    count, most, _ = uavs.rotors.shape
-    rotors = np.zeros((len(table.scene), most, 10))
-    turn = np.zeros((len(table.scene), most, 2))
+    count, max_rotors, _ = uavs.rotors.shape
+    rotors = np.zeros((len(table.scene), max_rotors, 10))
+    turn = np.zeros((len(table.scene), max_rotors, 2))
     rotors[:count] = uavs.rotors
-    turn[:count, :, 0], turn[:count, :, 1] = start[:count, :most], end[:count, :most]
+    turn[:count, :, 0], turn[:count, :, 1] = start[:count, :max_rotors], end[:count, :max_rotors]
     return table._replace(rotors=rotors, turn=turn)

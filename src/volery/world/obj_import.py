@@ -36,7 +36,7 @@ class _Faces:
         self.triangles = 0
 
 
-def read_obj(data: bytes, material_file: Callable[[str], bytes], most_triangles: int) -> list[Part]:
+def read_obj(data: bytes, material_file: Callable[[str], bytes], max_triangles: int) -> list[Part]:
     """Returns a part for each material of a file's content, in the order of their first use.
 
     material_file: returns the content of a file of materials; an `OSError` means that there is
@@ -54,8 +54,8 @@ def read_obj(data: bytes, material_file: Callable[[str], bytes], most_triangles:
             faces.points.append(_point(number, words))
         elif key in (b"f", b"fo"):
             _add_face(faces, number, words[1:], material)
-            if faces.triangles > most_triangles:
-                raise ValueError(f"it has more than {most_triangles:,} triangles")
+            if faces.triangles > max_triangles:
+                raise ValueError(f"it has more than {max_triangles:,} triangles")
         elif key == b"usemtl":
             name = line.split(None, 1)[1].strip() if len(words) > 1 else b""
             material = faces.names.setdefault(name, len(faces.names))
@@ -122,7 +122,7 @@ def _parts(faces: _Faces, material_file: Callable[[str], bytes]) -> list[Part]:
     points = np.array(faces.points, dtype=np.float64).reshape(-1, 3)
     corners, sizes = np.array(faces.corners), np.array(faces.sizes)
     _check(corners, sizes, faces)
-    with np.errstate(all="ignore"):  # vertices that are not finite are told by the caller
+    with np.errstate(all="ignore"):  # vertices that are not finite are reported by the caller
         triangles, owner = triangulated(points, corners, sizes)
     material = np.array(faces.materials)[owner]
     colours = _colours(faces.libraries, material_file)

@@ -249,21 +249,21 @@ def nearest_points(
     tables: NDArray[np.int64],
     worlds: NDArray[np.int32],
     points: NDArray[np.float64],
-    reach: float,
+    max_distance: float,
     memory: QueryMemory,
     distance: NDArray[np.float64],
     nearest: NDArray[np.float64],
     instance: NDArray[np.int32],
 ) -> None:
-    """Finds the nearest point of an Embree scene to each of `points` (P, 3) within `reach` m, map.
+    """Finds the nearest point of an Embree scene to each of `points` (P, 3) m, map.
 
     scenes, tables: (W,) Embree scenes of W worlds and (W, 5) their `world_row`s. worlds: (P,) the
     world of each point; (0,): the first for all. Fills `distance` (P,), `nearest` (P, 3) and
-    `instance` (P,), with `reach`, the point itself and -1 where nothing is within reach.
+    `instance` (P,), with `max_distance`, the point itself and -1 where nothing is within it.
     """
     query, context, state, user = memory
     user[0] = state.ctypes.data
-    limit = min(reach, _FAR_AWAY_M)
+    limit = min(max_distance, _FAR_AWAY_M)
     for i in range(points.shape[0]):
         for j in range(3):
             query[j] = points[i, j]
@@ -284,6 +284,6 @@ def nearest_points(
             scenes[world], query.ctypes.data, context.ctypes.data, callback, user.ctypes.data
         )
         instance[i] = int(state[_INSTANCE])
-        distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
+        distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else max_distance
         for j in range(3):
             nearest[i, j] = state[_NEAREST + j]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.core.compiled import inline_kernel, kernel
 
-MOST_CORNERS = 10_000
+MAX_CORNERS = 10_000
 """Maximum corners of a polygon that is not convex; the effort grows with their square."""
 _NOISE = 1e-12
 """Turns below this fraction of a polygon's extent squared are straight."""
@@ -27,7 +27,7 @@ def triangulated(
     points: (V, 3). corners: (sum(sizes),) rows of `points`, polygon after polygon. sizes: (P,), at
     least 3. Triangles turn as their polygon does. A self-intersecting polygon gets triangles
     between its corners, not of any particular area. Raises `ValueError` if a polygon that is not
-    convex has more than `MOST_CORNERS` corners.
+    convex has more than `MAX_CORNERS` corners.
     """
     counts = sizes - 2
     first_out = np.concatenate([[0], np.cumsum(counts)])
@@ -54,9 +54,9 @@ def _of_one_size(points: Array, rings: NDArray[np.int64]) -> NDArray[np.int64]:
     hard = np.flatnonzero(~(turns > _tolerance(flat)[:, None]).all(axis=1))
     if not len(hard):
         return fan
-    if size > MOST_CORNERS:
+    if size > MAX_CORNERS:
         raise ValueError(
-            f"a face that is not convex has {size:,} corners; at most {MOST_CORNERS:,} are read"
+            f"a face that is not convex has {size:,} corners; at most {MAX_CORNERS:,} are read"
         )
     local = np.empty((len(hard), size - 2, 3), dtype=np.int64)
     _clip_all(np.ascontiguousarray(flat[hard]), _tolerance(flat[hard]), local)
@@ -72,8 +72,8 @@ def _in_their_planes(points: Array, rings: NDArray[np.int64]) -> Array:
     area = np.cross(own, np.roll(own, -1, axis=1)).sum(axis=1)
     length = np.linalg.norm(area, axis=1, keepdims=True)
     up = np.divide(area, length, out=np.tile([0.0, 0.0, 1.0], (len(area), 1)), where=length > 0.0)
-    least = np.eye(3)[np.argmin(np.abs(up), axis=1)]
-    x = np.cross(least, up)
+    base_axis = np.eye(3)[np.argmin(np.abs(up), axis=1)]
+    x = np.cross(base_axis, up)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     y = np.cross(up, x)
     return np.stack([np.einsum("pki,pi->pk", own, axis) for axis in (x, y)], axis=2)
@@ -147,7 +147,7 @@ def _next_ear(
             other = after[b]
             while other != a:
                 # only corners that are not convex can lie in an ear; ends of a bridge to a hole
-                # are at the same place as a corner of it
+                # are at the same position as a corner of it
                 if (
                     _area(p, before[other], other, after[other]) <= small
                     and not (_same(p, other, a) or _same(p, other, at) or _same(p, other, b))

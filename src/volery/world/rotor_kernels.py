@@ -27,11 +27,11 @@ def meets_blade(
     triangle: its number in the mesh of all discs of a body. fraction: of the interval of motion.
     """
     rotor = min(triangle // DISC_SIDES, bodies.rotors.shape[1] - 1)
-    place, turn = bodies.rotors[row, rotor], bodies.turn[row, rotor]
-    dx, dy, dz = x - place[0], y - place[1], z - place[2]
-    a = dx * place[3] + dy * place[4] + dz * place[5]
-    b = dx * place[6] + dy * place[7] + dz * place[8]
-    radius = place[9]
+    rotor_row, turn = bodies.rotors[row, rotor], bodies.turn[row, rotor]
+    dx, dy, dz = x - rotor_row[0], y - rotor_row[1], z - rotor_row[2]
+    a = dx * rotor_row[3] + dy * rotor_row[4] + dz * rotor_row[5]
+    b = dx * rotor_row[6] + dy * rotor_row[7] + dz * rotor_row[8]
+    radius = rotor_row[9]
     away = np.sqrt(a * a + b * b)
     if radius == 0.0 or away <= _HUB * radius:  # no radius: not a turning rotor
         return True

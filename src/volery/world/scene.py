@@ -49,7 +49,7 @@ class Clearance(NamedTuple):
     """Nearest surface points of P points."""
 
     distance: NDArray[np.float64]
-    """(P,) m; the reach if nothing is nearer. Negative inside a closed solid."""
+    """(P,) m; the maximum distance if nothing is nearer. Negative inside a closed solid."""
     nearest: NDArray[np.float64]
     """(P, 3) m, map; the point itself if nothing is nearer."""
     instance: NDArray[np.int32]
@@ -215,7 +215,7 @@ class Scene:
         self,
         origins: ArrayLike,
         directions: ArrayLike,
-        reach_m: float,
+        max_range_m: float,
         exclude: int | ArrayLike = -1,
         *,
         fraction: float = 1.0,
@@ -223,8 +223,8 @@ class Scene:
     ) -> Hits:
         """Returns the closest hits of rays: origins (R, 3) m, unit directions (R, 3), map.
 
-        reach_m: maximum distance. exclude: row of the UAV whose own body the rays do not see, or
-        one per ray (R,); -1: none. fraction: of the bodies' interval of motion; 1 is the newest
+        max_range_m: maximum distance. exclude: row of the UAV whose own body the rays do not see,
+        or one per ray (R,); -1: none. fraction: of the bodies' interval of motion; 1 is the newest
         pose. out: an earlier result for as many rays, whose memory is reused, which speeds up large
         batches. Raises `ValueError` for arrays of a wrong shape.
         """
@@ -238,7 +238,7 @@ class Scene:
             self.workers,
             o,
             d,
-            float(reach_m),
+            float(max_range_m),
             _rows(exclude, count),
             float(fraction),
             hits,
@@ -268,39 +268,39 @@ class Scene:
     def clearance(
         self,
         points: ArrayLike,
-        reach_m: float,
+        max_distance_m: float,
         include_terrain: bool = True,
         *,
         uavs: NDArray[np.int64] | None = None,
     ) -> Clearance:
         """Returns the nearest point of the static world to each point (P, 3), m, map.
 
-        The static world consists of trees, solids and, unless excluded, the terrain; `reach_m` is
-        the maximum distance. `Solid` defines the inside of a solid. uavs: (P,) rows of the UAVs at
-        the points, whose worlds a `WorldScenes` asks. Raises `ValueError` if points are not finite
-        or the reach is negative.
+        The static world consists of trees, solids and, unless excluded, the terrain;
+        `max_distance_m` is the maximum distance. `Solid` defines the inside of a solid. uavs: (P,)
+        rows of the UAVs at the points, whose worlds a `WorldScenes` asks. Raises `ValueError` if
+        points are not finite or the distance is negative.
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(p).all():
             raise ValueError("points must be finite")
-        if not reach_m >= 0.0:
-            raise ValueError(f"reach_m must not be negative, not {reach_m}")
+        if not max_distance_m >= 0.0:
+            raise ValueError(f"max_distance_m must not be negative, not {max_distance_m}")
         result = Clearance(
             np.empty(len(p)), np.empty((len(p), 3)), np.empty(len(p), dtype=np.int32)
         )
-        self._nearest(p, float(reach_m), include_terrain, uavs, result)
+        self._nearest(p, float(max_distance_m), include_terrain, uavs, result)
         return result
 
     def _nearest(
         self,
         p: NDArray[np.float64],
-        reach_m: float,
+        max_distance_m: float,
         include_terrain: bool,
         uavs: NDArray[np.int64] | None,  # noqa: ARG002 - for subclasses
         result: Clearance,
     ) -> None:
         """Fills `result` of `clearance`."""
-        self.backend.clearance(p, reach_m, include_terrain, result)
+        self.backend.clearance(p, max_distance_m, include_terrain, result)
         if self.solids:
             enclosing = self.enclosing(p)
             inside = enclosing >= 0

@@ -128,8 +128,8 @@ class SceneContent:
 
 def rotor_table(shapes: Sequence[BodyShape]) -> NDArray[np.float64]:
     """Returns the rotors (shapes, R, 10) of body shapes, padded with zeros."""
-    most = max((len(shape.rotors) for shape in shapes), default=0)
-    table = np.zeros((len(shapes), most, 10))
+    max_rotors = max((len(shape.rotors) for shape in shapes), default=0)
+    table = np.zeros((len(shapes), max_rotors, 10))
     for row, shape in zip(table, shapes, strict=True):
         row[: len(shape.rotors)] = shape.rotors
     return table
@@ -169,7 +169,7 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
     for row, solid in zip(material, solids, strict=True):
         row[:] = solid.material, solid.material if solid.top is None else solid.top
     vertices, triangles, length = _memory_of(new)
-    places = len(staying) + np.arange(count)
+    part_rows = len(staying) + np.arange(count)
     return replace(
         content,
         parts=(*staying, *new),
@@ -177,7 +177,7 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
             vertices=np.concatenate([old.vertices[: len(staying)], vertices]),
             triangles=np.concatenate([old.triangles[: len(staying)], triangles]),
             length=np.concatenate([old.length[: len(staying)], length]),
-            first_part=np.concatenate([old.first_part[:first], places]),
+            first_part=np.concatenate([old.first_part[:first], part_rows]),
             part_count=np.concatenate([old.part_count[:first], np.ones(count, dtype=np.int64)]),
             transform=np.concatenate([old.transform[:first], transform.reshape(count, 12)]),
         ),

@@ -53,14 +53,14 @@ CHUNK = 512
 """Rays of one piece of work; a multiple of LANES, so that packets do not depend on threads."""
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
 """Maximum distance (m) and angle of coherent rays in a packet."""
-_LEAST_COMPONENT = np.float32(1e-12)
+_MIN_COMPONENT = np.float32(1e-12)
 """Minimum component of a direction; smaller ones become zero.
 
 Embree's coherent traversal sorts rays by the signs of their directions, but takes the reciprocal of
 a component below 1e-18 as positive: one beam at -90 degrees, whose cosine is a rounding error,
 would make its neighbours miss.
 """
-_MOST_PASSED = 64
+_MAX_PASSED = 64
 """Maximum number of tree surfaces that an upward ray passes."""
 _SHORT_OF_TARGET_M = 1e-4
 """Distance before the target at which `occluded` ends, so that the target's surface hides nothing.
@@ -70,14 +70,16 @@ _SHORT_OF_TARGET_M = 1e-4
 @inner_kernel
 def _settled(component: Any) -> Any:
     """Returns a component of a direction, zero if negligible."""
-    return component if abs(component) >= _LEAST_COMPONENT else np.float32(0.0)
+    return component if abs(component) >= _MIN_COMPONENT else np.float32(0.0)
 
 
 @inner_kernel
-def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float) -> None:
+def _make_ready(
+    rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, max_range: float
+) -> None:
     """Initialises the rows of packet `p` that a cast changes."""
     for k in range(LANES):
-        rays[p, FAR, k] = reach
+        rays[p, FAR, k] = max_range
         words[p, GEOMETRY, k] = _INVALID
         words[p, INSTANCE, k] = _INVALID
     for j in range(DIRECTION, DIRECTION + 3):
@@ -98,7 +100,7 @@ def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
 
 @inner_kernel
 def cast_block(
-    scene: SceneHandle, block: RayBlock, count: int, reach: float, near_count: int
+    scene: SceneHandle, block: RayBlock, count: int, max_range: float, near_count: int
 ) -> None:
     """Finds the closest hits of the block's first `count` rays, on static and moving geometry.
 
@@ -113,7 +115,7 @@ def cast_block(
     cover = scene.cover
     is_covered = cover.material.shape[0] > 0
     packets = (count + LANES - 1) // LANES
-    limit: Any = np.float32(reach)
+    limit: Any = np.float32(max_range)
     for k in range(LANES):
         valid[k] = -1
     for p in range(packets):
@@ -165,7 +167,7 @@ def _near_chunk(
     exclude: NDArray[np.int32],
     first: int,
     last: int,
-    reach: float,
+    max_range: float,
     near: NDArray[np.int32],
 ) -> int:
     if scene.bodies.scene.shape[0] == 0:
@@ -180,7 +182,7 @@ def _near_chunk(
     for i in range(first + 1, last if exclude.shape[0] > 1 else 0):
         low_uav, high_uav = min(low_uav, exclude[i]), max(high_uav, exclude[i])
     return near_bodies_of_several(
-        scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, low_uav, high_uav, near
+        scene.bodies, (x0, y0, z0), (x1, y1, z1), max_range, low_uav, high_uav, near
     )
 
 
@@ -196,7 +198,7 @@ def cast_rays(
     scene: SceneHandle,
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
-    reach: float,
+    max_range: float,
     exclude: NDArray[np.int32],
     fraction: float,
     counter: NDArray[np.int64],
@@ -220,7 +222,7 @@ def cast_rays(
         if first >= count:
             return
         last = min(first + CHUNK, count)
-        near_count = _near_chunk(scene, origins, exclude, first, last, reach, block.near)
+        near_count = _near_chunk(scene, origins, exclude, first, last, max_range, block.near)
         if near_count > 0:
             _load_skips(block, exclude, first, last)
         packets = (last - first + LANES - 1) // LANES
@@ -230,7 +232,7 @@ def cast_rays(
                 for j in range(3):
                     rays[p, ORIGIN + j, k] = origins[start + k, j]
                     rays[p, DIRECTION + j, k] = directions[start + k, j]
-        cast_block(scene, block, last - first, reach, near_count)
+        cast_block(scene, block, last - first, max_range, near_count)
         for p in range(packets):
             start = first + p * LANES
             for k in range(min(LANES, last - start)):
@@ -343,7 +345,7 @@ def find_enclosing(
         for j in range(3):
             rays[0, ORIGIN + j, 0] = points[i, j]
             rays[0, DIRECTION + j, 0] = np.float32(1.0) if j == 2 else np.float32(0.0)
-        for _ in range(_MOST_PASSED):
+        for _ in range(_MAX_PASSED):
             rays[0, FAR, 0] = np.float32(np.inf)
             words[0, GEOMETRY, 0] = _INVALID
             words[0, INSTANCE, 0] = _INVALID

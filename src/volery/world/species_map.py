@@ -70,11 +70,11 @@ def _key(name: str) -> str:
 
 
 def _listed(unknown: Counter[str]) -> str:
-    most = [f"{_plain(name)} {count}" for name, count in unknown.most_common(_MAX_SHOWN)]
+    names = [f"{_plain(name)} {count}" for name, count in unknown.most_common(_MAX_SHOWN)]
     rest = ", ..." if len(unknown) > _MAX_SHOWN else ""
     trees = counted(sum(unknown.values()), "tree")
     kinds = counted(len(unknown), "species", "species")
-    return f"{trees} of {kinds} that are not known ({', '.join(most)}{rest})"
+    return f"{trees} of {kinds} that are not known ({', '.join(names)}{rest})"
 
 
 def _shown(names: Sequence[str]) -> str:

@@ -21,7 +21,7 @@ _UNKNOWN_COUNTS = (0, 0x7FFFFFFF, 0xFFFFFFFF)
 
 Any other number that is larger than the file is that of a file that is cut off.
 """
-_MOST_WORDS = 5
+_MAX_WORDS = 5
 _ENDS = (b"endloop", b"end", b"endfacet", b"facet", b"endsolid")
 """Statements that end a loop; some programs write `end loop`, or leave one out."""
 _STATEMENT = re.compile(
@@ -32,20 +32,20 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(data: bytes, most_triangles: int) -> list[Part]:
+def read_stl(data: bytes, max_triangles: int) -> list[Part]:
     """Returns the surface of a file's content; raises `ValueError` for damaged ones."""
-    corners = _binary(data, most_triangles)
+    corners = _binary(data, max_triangles)
     if corners is None:
         if data.startswith(_UTF_16):
             raise ValueError("it is text in UTF-16; save it as UTF-8")
         text = data.rstrip(_PADDING)
         if b"\0" in text or (text != data and b"vertex" not in text.lower()):
             raise ValueError(_not_whole(data))
-        return _text(text, most_triangles)
+        return _text(text, max_triangles)
     return [Part(corners, np.arange(len(corners)).reshape(-1, 3), None)]
 
 
-def _binary(data: bytes, most_triangles: int) -> np.ndarray | None:
+def _binary(data: bytes, max_triangles: int) -> np.ndarray | None:
     """Returns the corners (3 T, 3) of a binary file; None if it is none."""
     pieces: list[np.ndarray] = []
     begin, total = 0, 0
@@ -58,8 +58,8 @@ def _binary(data: bytes, most_triangles: int) -> np.ndarray | None:
         if not 0 < count <= room:
             break
         total += count
-        if total > most_triangles:
-            raise ValueError(f"it has {total:,} triangles; at most {most_triangles:,} are read")
+        if total > max_triangles:
+            raise ValueError(f"it has {total:,} triangles; at most {max_triangles:,} are read")
         rows = np.frombuffer(data, _TRIANGLE, count, begin + _HEAD)
         pieces.append(rows["corners"].astype(np.float64).reshape(-1, 3))
         begin += _HEAD + count * _TRIANGLE.itemsize
@@ -81,7 +81,7 @@ def _not_whole(data: bytes) -> str:
     )
 
 
-def _text(data: bytes, most_triangles: int) -> list[Part]:
+def _text(data: bytes, max_triangles: int) -> list[Part]:
     points: list[tuple[float, float, float]] = []
     sizes: list[int] = []
     first = triangles = 0
@@ -99,8 +99,8 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
                 sizes.append(size)
                 triangles += size - 2
                 first = len(points)
-                if triangles > most_triangles:
-                    raise ValueError(f"it has more than {most_triangles:,} triangles")
+                if triangles > max_triangles:
+                    raise ValueError(f"it has more than {max_triangles:,} triangles")
     if first < len(points):
         raise ValueError("it is cut off within a facet: 'endloop' is missing")
     if is_open:
@@ -110,20 +110,20 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
     last = words[-1].lower()
     if b"facet".startswith(last) and words[0].lower() not in (b"solid", b"endsolid", b"end"):
         raise ValueError(f"it is cut off: its last word is '{last.decode()}'")
-    places = np.array(points, dtype=np.float64)
-    if not np.isfinite(places).all():  # told with its vertex by the caller
-        return [Part(places, np.array([[0, 1, 2]]), None)]
-    rows, _ = triangulated(places, np.arange(len(places)), np.array(sizes))
-    return [Part(places, rows, None)]
+    vertices = np.array(points, dtype=np.float64)
+    if not np.isfinite(vertices).all():  # reported with its vertex by the caller
+        return [Part(vertices, np.array([[0, 1, 2]]), None)]
+    rows, _ = triangulated(vertices, np.arange(len(vertices)), np.array(sizes))
+    return [Part(vertices, rows, None)]
 
 
 def _statements(line: bytes) -> list[list[bytes]]:
     """Returns the words of each statement: usually one a line, of at most five words."""
     words = line.split()
-    if len(words) <= _MOST_WORDS:
+    if len(words) <= _MAX_WORDS:
         return [words]
     begins = [m.start() for m in _STATEMENT.finditer(line)]
-    if words[0].lower() in (b"solid", b"endsolid") and len(begins) < _MOST_WORDS:
+    if words[0].lower() in (b"solid", b"endsolid") and len(begins) < _MAX_WORDS:
         return [words]  # words of a name
     begins = [0, *begins]
     return [line[a:b].split() for a, b in zip(begins, [*begins[1:], len(line)], strict=True)]

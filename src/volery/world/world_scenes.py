@@ -82,7 +82,7 @@ class WorldScenes(Scene):
         self,
         origins: ArrayLike,
         directions: ArrayLike,
-        reach_m: float,
+        max_range_m: float,
         exclude: int | ArrayLike = -1,
         *,
         fraction: float = 1.0,
@@ -101,7 +101,9 @@ class WorldScenes(Scene):
         for w in np.unique(world).tolist():
             own = np.flatnonzero(world == w)
             alone = self._alone(w)
-            hits = alone.cast(origins[own], directions[own], reach_m, rows[own], fraction=fraction)
+            hits = alone.cast(
+                origins[own], directions[own], max_range_m, rows[own], fraction=fraction
+            )
             parts.append((own, hits))
         if len(parts) == 1 and out is None:
             return parts[0][1]
@@ -110,24 +112,31 @@ class WorldScenes(Scene):
     def _nearest(
         self,
         p: NDArray[np.float64],
-        reach_m: float,
+        max_distance_m: float,
         include_terrain: bool,
         uavs: NDArray[np.int64] | None,
         result: Clearance,
     ) -> None:
         if uavs is None:
-            super()._nearest(p, reach_m, include_terrain, None, result)
+            super()._nearest(p, max_distance_m, include_terrain, None, result)
             return
         world = self._world_of(uavs)
         if not self._tables.has_solids:
             scenes, tables = self._tables.query_rows[include_terrain]
             nearest_points(
-                scenes, callback_address(), tables, world, p, reach_m, query_memory(), *result
+                scenes,
+                callback_address(),
+                tables,
+                world,
+                p,
+                max_distance_m,
+                query_memory(),
+                *result,
             )
             return
         for w in np.unique(world).tolist():
             own = np.flatnonzero(world == w)
-            found = self._tables.scene(w).clearance(p[own], reach_m, include_terrain)
+            found = self._tables.scene(w).clearance(p[own], max_distance_m, include_terrain)
             pairs: Iterator[tuple[Any, Any]] = zip(result, found, strict=True)
             for whole, part in pairs:
                 whole[own] = part

@@ -27,8 +27,8 @@ STRING = "std_msgs/msg/String"
 IMAGE = "sensor_msgs/msg/Image"
 TRIGGER = "std_srvs/srv/Trigger"
 LIMIT_BYTES = 12 << 20
-"""Of one message, where a bridge can be told."""
-PATIENCE_S = 600.0
+"""Of one message, where a bridge has the setting."""
+TIMEOUT_S = 600.0
 _TCP_REPAIR = 19
 
 Triggered = message_type(f"{TRIGGER}_Response")
@@ -42,24 +42,24 @@ class Client:
     """A plain program at the other end of a bridge; adapters say how each thing is done.
 
     What comes is sorted into `messages` and `errors` by a thread of the adapter's; `next` and
-    `error` wait for it. Services that were offered answer `their_answer` by themselves,
+    `error` wait for it. Services that were created respond with `their_response` by themselves,
     or never if that is None.
     """
 
-    their_answer = "from the client, übrigens"
+    their_response = "from the client, übrigens"
 
     def __init__(self):
         self.messages = queue.Queue()
         self.errors = queue.Queue()
-        self.answers = queue.Queue()
+        self.responses = queue.Queue()
 
-    def next(self, timeout_s=PATIENCE_S):
+    def next(self, timeout_s=TIMEOUT_S):
         """The next message: the text of a String, the number of bytes of an Image."""
         return self.messages.get(timeout=timeout_s)
 
     def error(self):
         """The next complaint of our side."""
-        return self.errors.get(timeout=PATIENCE_S)
+        return self.errors.get(timeout=TIMEOUT_S)
 
     def advertise(self, topic, msgtype=STRING, *, latched=False):
         raise NotImplementedError
@@ -106,7 +106,7 @@ class Client:
         raise NotImplementedError
 
     def reset(self):
-        """Die: the connection ends without farewell (RST)."""
+        """Die: the connection is reset (RST)."""
         raise NotImplementedError
 
     def sockets(self):
@@ -153,7 +153,7 @@ class Ours:
         return seen
 
     def create_service(self, service, text):
-        """A Trigger that answers with a text."""
+        """A Trigger that responds with a text."""
         self.live.graph.create_service(service, TRIGGER, lambda _request: Triggered(True, text))
 
     def call(self, service):
@@ -171,7 +171,7 @@ class Ours:
         until(lambda: self.live.graph.has_service(service))
 
     def counts(self):
-        """Who takes part: sessions, publishers and subscribers of used topics, services."""
+        """The participants: sessions, publishers and subscribers of used topics, services."""
         topics = {
             t.name: (t.publishers, t.subscribers)
             for t in self.live.graph.topics()
@@ -185,7 +185,7 @@ class Ours:
 
 
 class Bench:
-    """A bridge that is open, and the way to its other end."""
+    """A bridge that is open, and how to reach its other end."""
 
     cannot: Mapping[str, str] = MappingProxyType({})
     topics = 2000
@@ -213,7 +213,7 @@ class Bench:
         return client
 
     def another(self, client):
-        """Somebody else, who must not suffer from what `client` does."""
+        """Another client, which must not suffer from what `client` does."""
         return self.connect() if "others" not in self.cannot else client
 
     def _connect(self, reading):
@@ -257,7 +257,7 @@ def taken_port():
 
 
 def vanish(sock):
-    """End a connection so that the other end hears nothing: no FIN, no RST, as a pulled plug does.
+    """End a connection without FIN and without RST, as a pulled plug does.
 
     Skips the test where the system does not allow it.
     """
@@ -275,5 +275,5 @@ def reset(sock, reader=None):
     with contextlib.suppress(OSError):
         sock.shutdown(socket.SHUT_RD)  # the reader lets go, and only now a close is one
     if reader is not None and reader.is_alive():
-        reader.join(PATIENCE_S)
+        reader.join(TIMEOUT_S)
     sock.close()

@@ -48,7 +48,7 @@ class NodeClient(Client):
         self.node.publish(topic, self._form.image(size))
 
     def _is_connected(self, topic):
-        """Whether our bridge has us among the readers of a topic, as it tells everyone who asks."""
+        """Whether our bridge has us among the readers of a topic, as it reports to every client."""
         with ServerProxy(self.node.master.lookupNode(self.node.name, "/volery")[2]) as bridge:
             found = bridge.getBusInfo(self.node.name)[2]
         return any(row[1:5] == [self.node.name, "o", "TCPROS", topic] for row in found)
@@ -69,15 +69,17 @@ class NodeClient(Client):
             body = self.node.call(service, TRIGGER.replace("/srv", ""), md5=md5)
         except ConnectionError as error:
             raise Refused(str(error)) from None
-        return self._form.answer(body)
+        return self._form.response_text(body)
 
     def call_in_vain(self, service):
         until(lambda: self.node.master.lookupService(self.node.name, service)[0] != 1)
         raise Refused("the master knows no server")
 
     def create_service(self, service):
-        answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
-        self.node.create_service(service, TRIGGER.replace("/srv", ""), answer)
+        response = (
+            None if self.their_response is None else self._form.triggered(self.their_response)
+        )
+        self.node.create_service(service, TRIGGER.replace("/srv", ""), response)
 
     def settle(self):
         """Nothing is answered; connections are waited for when they are made."""
@@ -86,7 +88,7 @@ class NodeClient(Client):
         self.node.publish_raw("/in", b"\xff\0\0\0half")
 
     def reset(self):
-        self.node.close(farewell=False)
+        self.node.close(unregister=False)
 
     def close(self):
         self.node.close()
@@ -106,7 +108,7 @@ class Ros1Bench(Bench):
             "limits": "TCPROS knows none",
             "listening": "nodes take free ports",
             "leaving": "the bridge stands for all nodes, those that are gone too",
-            "errors": "TCPROS has no way to tell a publisher what was wrong",
+            "errors": "TCPROS carries no errors to a publisher",
         }
     )
     topics = 25  # each costs both nodes several calls of the master's
@@ -127,12 +129,12 @@ class Ros1Bench(Bench):
         return 1
 
     def _connect(self, reading):
-        return NodeClient(self._master, reading, self._is_heard)
+        return NodeClient(self._master, reading, self._is_subscribed)
 
     def close(self):
         super().close()
         gc.collect()  # rospy forgets to close sockets; the complaints belong here
 
-    def _is_heard(self, topic):
+    def _is_subscribed(self, topic):
         """Whether a subscription has reached the graph."""
         return any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())

@@ -33,10 +33,10 @@ class PeerClient(Client):
         self._reading = reading
         self._form = Form("ros2")
         self._kinds = {}
-        self._peer = take_peer(self._hear)
+        self._peer = take_peer(self._receive)
 
-    def _hear(self, told):
-        self._take(told["heard"], base64.b64decode(told["data"]), told["size"])
+    def _receive(self, report):
+        self._take(report["topic"], base64.b64decode(report["data"]), report["size"])
 
     def _do(self, op, **fields):
         return self._peer.do(op, **fields)
@@ -70,15 +70,15 @@ class PeerClient(Client):
         latched = topic in LATCHED
         assert self._do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
         self._bench.readers[topic] += 1
-        until(lambda: self._bench.is_heard(topic))
+        until(lambda: self._bench.is_subscribed(topic))
         if not self._reading:
             self._peer.stop()
 
     def call(self, service):
-        answer = self._do("call", service=service)
-        if answer is None:
+        response = self._do("call", service=service)
+        if response is None:
             raise Refused("no answer")
-        data = base64.b64decode(answer)
+        data = base64.b64decode(response)
         (length,) = struct.unpack_from("<I", data, 8)
         text = data[12 : 12 + length - 1].decode()
         if not data[_SUCCESS_AT]:  # ROS 2 has no word for a failure but the response's own
@@ -90,8 +90,10 @@ class PeerClient(Client):
         raise Refused("no server")
 
     def create_service(self, service):
-        answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
-        data = None if answer is None else base64.b64encode(answer).decode()
+        response = (
+            None if self.their_response is None else self._form.triggered(self.their_response)
+        )
+        data = None if response is None else base64.b64encode(response).decode()
         assert self._do("create_service", service=service, answer=data)
         until(lambda: self._bench.is_offered(service))
 
@@ -99,7 +101,7 @@ class PeerClient(Client):
         """Nothing is answered; matches are waited for when they are made."""
 
     def send_half_a_frame(self):
-        """The beginning of an RTPS message, to all who may listen in the domain."""
+        """The beginning of an RTPS message, to all participants of the domain."""
         base = _BASE_PORT + _PORTS_A_DOMAIN * DOMAIN + _UNICAST
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
             for port in range(base, base + 20):
@@ -109,13 +111,13 @@ class PeerClient(Client):
         self._peer.kill()
         topics = tuple(self._kinds)
         self._end()
-        # Until its lease is over the bridge takes it for a listener, and who comes back for heard.
-        until(lambda: not any(map(self._bench.is_overheard, topics)))
+        # Until its lease is over the bridge counts it among the readers.
+        until(lambda: not any(map(self._bench.has_stale_readers, topics)))
 
     def close(self):
         if self._peer is not None:
             self._peer.give_back()
-            self._peer = None  # it may be somebody else's from now on
+            self._peer = None  # another test may use it from now on
             self._end()
 
     def _end(self):
@@ -128,12 +130,12 @@ class Ros2Bench(Bench):
 
     cannot = MappingProxyType(
         {
-            "own types": "in DDS types are matched by all who see them; publishers are not told",
-            "reliability": "publishers keep the last messages, so that nobody can hold them up",
+            "own types": "DDS readers match the types themselves; publishers receive no error",
+            "reliability": "publishers keep the last messages, so that no reader can hold them up",
             "limits": "DDS knows none",
             "listening": "participants take free ports",
             "leaving": "the bridge stands for all nodes, those that are gone too",
-            "errors": "DDS has no way to tell a publisher what was wrong",
+            "errors": "DDS carries no errors to a publisher",
         }
     )
     topics = 25  # each is discovered with four endpoints
@@ -152,12 +154,12 @@ class Ros2Bench(Bench):
         """The bridge subscribes once for all."""
         return 1
 
-    def is_heard(self, topic):
+    def is_subscribed(self, topic):
         """Whether a subscription has reached the graph, and the bridge's writer each reader."""
         known = any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
         return known and self._subscribers(topic) >= self.readers[topic]
 
-    def is_overheard(self, topic):
+    def has_stale_readers(self, topic):
         """Whether the bridge's writer has readers that are none."""
         return self._subscribers(topic) > self.readers[topic]
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from bridge_bench import (
     IMAGE,
     LIMIT_BYTES,
-    PATIENCE_S,
+    TIMEOUT_S,
     Bench,
     Client,
     Refused,
@@ -59,7 +59,7 @@ class Form:
             return CDR + b"\1\0\0\0" + self.string(text.encode())[4:]
         return b"\1" + self.string(text.encode())
 
-    def answer(self, payload):
+    def response_text(self, payload):
         return payload[12:-1].decode() if self.ros2 else payload[5:].decode()
 
     def request(self):
@@ -73,7 +73,7 @@ class RosTcpPartner(Client):
         super().__init__()
         self.sock = sock
         self.form = form
-        self.told = queue.Queue()
+        self.commands = queue.Queue()
         """Commands that are neither errors nor parts of services."""
         self._kinds = {}
         self._expected = None
@@ -103,10 +103,10 @@ class RosTcpPartner(Client):
     def call(self, service):
         header = json.dumps({"srv_id": 77}).encode() + b"\0" * self.form.ros2
         self.send(("__request", header), (service, self.form.request()))
-        body = self.answers.get(timeout=PATIENCE_S)
+        body = self.responses.get(timeout=TIMEOUT_S)
         if not body:
             raise Refused(self.error())
-        return self.form.answer(body)
+        return self.form.response_text(body)
 
     def send_half_a_frame(self):
         self.sock.sendall(frame(*("/in", self.form.string(b"never whole")))[:-3])
@@ -145,17 +145,17 @@ class RosTcpPartner(Client):
             kind, number = self._expected
             self._expected = None
             if kind == "__response":
-                self.answers.put(payload)
-            elif name in self._offered and self.their_answer is not None:
+                self.responses.put(payload)
+            elif name in self._offered and self.their_response is not None:
                 header = json.dumps({"srv_id": number}).encode() + b"\0" * self.form.ros2
-                body = self.form.triggered(self.their_answer)
+                body = self.form.triggered(self.their_response)
                 self.send(("__response", header), (name, body))
         elif name:
             image = self._kinds.get(name) == IMAGE
             self.messages.put(self.form.image_size(payload) if image else self.form.text(payload))
 
     def _command(self, name, fields):
-        self.told.put((name, fields))
+        self.commands.put((name, fields))
 
 
 def _exactly(file, count):
@@ -177,11 +177,11 @@ class PlainConnector(RosTcpPartner):
         sock = socket.socket()
         if not reading:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        sock.settimeout(2 * PATIENCE_S)
+        sock.settimeout(2 * TIMEOUT_S)
         sock.connect(("127.0.0.1", port))
         super().__init__(sock, form, reading)
         if reading:
-            assert self.told.get(timeout=PATIENCE_S)[0] == "__handshake"
+            assert self.commands.get(timeout=TIMEOUT_S)[0] == "__handshake"
 
     def advertise(self, topic, msgtype="std_msgs/msg/String", *, latched=False):
         self.command("publish", topic=topic, message_name=_short(msgtype), latch=latched)
@@ -200,7 +200,7 @@ class PlainConnector(RosTcpPartner):
 
     def settle(self):
         self.command("topic_list")
-        while self.told.get(timeout=PATIENCE_S)[0] != "__topic_list":
+        while self.commands.get(timeout=TIMEOUT_S)[0] != "__topic_list":
             pass
 
 
@@ -217,7 +217,7 @@ class EndpointBench(Bench):
 
     def _make(self, port):
         return RosTcpEndpoint(
-            port=port, generation=self.form.generation, most_payload_bytes=LIMIT_BYTES
+            port=port, generation=self.form.generation, max_payload_bytes=LIMIT_BYTES
         )
 
     def _connect(self, reading):
@@ -243,7 +243,7 @@ class PlainEndpoint(RosTcpPartner):
         until(lambda: topic in self._wanted)
 
     def subscribe(self, topic, msgtype="std_msgs/msg/String"):
-        """Nothing is asked for: our side sends all that it has."""
+        """No request is needed: our side sends all that it has."""
         self._kinds[topic] = msgtype
         until(lambda: topic in self._sends or not self._reader.ident)
 
@@ -271,7 +271,7 @@ class ConnectorBench(Bench):
         {
             "services of clients": "endpoints offer none to a connector",
             "late joiners": "endpoints keep what is latched, for their own side",
-            "errors": "a connector has no way to tell an endpoint; it notes what was wrong",
+            "errors": "a connector sends no errors to an endpoint; it logs what was wrong",
             "own types": "a connector names the types",
             "advertising": "endpoints announce nothing",
             "reliability": "endpoints do not subscribe",
@@ -295,14 +295,14 @@ class ConnectorBench(Bench):
         dead = [c for c in self.clients if c.sock.fileno() == -1]
         listener = dead[-1].listener if dead else self._listen()
         sock, _ = listener.accept()
-        sock.settimeout(2 * PATIENCE_S)
+        sock.settimeout(2 * TIMEOUT_S)
         client = PlainEndpoint(sock, self.form, reading, set(), set())
         client.listener = listener
         return client
 
     def _listen(self):
         listener = socket.socket()
-        listener.settimeout(PATIENCE_S)
+        listener.settimeout(TIMEOUT_S)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
         listener.bind(("127.0.0.1", 0))
         listener.listen(1)
@@ -311,7 +311,7 @@ class ConnectorBench(Bench):
             port=listener.getsockname()[1],
             subscribe=["/in*", "/image_in"],
             publish=["/*out*"],
-            handshake_s=PATIENCE_S,
+            handshake_s=TIMEOUT_S,
         )
         self._connectors[listener] = connector
         self.ours.bridges.open(connector)

@@ -15,8 +15,8 @@ import cbor2
 from bridge_bench import (
     IMAGE,
     LIMIT_BYTES,
-    PATIENCE_S,
     STRING,
+    TIMEOUT_S,
     TRIGGER,
     Bench,
     Client,
@@ -43,7 +43,7 @@ class RosbridgePartner(Client):
     def __init__(self, websocket, compression, reading):
         super().__init__()
         self.websocket = websocket
-        self.told = queue.Queue()
+        self.operations = queue.Queue()
         self._compression = compression
         self._kinds = {}
         self._offered = set()
@@ -77,10 +77,10 @@ class RosbridgePartner(Client):
 
     def call(self, service):
         self.send("call_service", service=service, type=TRIGGER, id=f"c{next(_numbers)}")
-        answer = self.answers.get(timeout=PATIENCE_S)
-        if not answer["result"]:
-            raise Refused(answer["values"])
-        return answer["values"]["message"]
+        response = self.responses.get(timeout=TIMEOUT_S)
+        if not response["result"]:
+            raise Refused(response["values"])
+        return response["values"]["message"]
 
     def send_too_much(self):
         self.websocket.send("x" * (LIMIT_BYTES + 1))
@@ -116,15 +116,15 @@ class RosbridgePartner(Client):
         elif op == "status":
             self.errors.put(operation["msg"])
         elif op == "service_response" and str(operation.get("id")).startswith("c"):
-            self.answers.put(operation)
-        elif op == "call_service" and self.their_answer is None:
-            return  # it never will answer
+            self.responses.put(operation)
+        elif op == "call_service" and self.their_response is None:
+            return  # it never responds
         elif op == "call_service" and operation["service"] in self._offered:
-            values = {"success": True, "message": self.their_answer}
-            answer = {"service": operation["service"], "id": operation["id"]}
-            self.send("service_response", **answer, values=values, result=True)
+            values = {"success": True, "message": self.their_response}
+            response = {"service": operation["service"], "id": operation["id"]}
+            self.send("service_response", **response, values=values, result=True)
         else:
-            self.told.put(operation)
+            self.operations.put(operation)
 
     def _value(self, topic, message):
         image = self._kinds.get(topic) == IMAGE
@@ -161,12 +161,12 @@ class PlainClient(RosbridgePartner):
     def settle(self):
         key = f"s{next(_numbers)}"
         self.send("unadvertise_service", service="/nothing", id=key)
-        while self.told.get(timeout=PATIENCE_S).get("id") != key:
+        while self.operations.get(timeout=TIMEOUT_S).get("id") != key:
             pass
 
     def _sort(self, operation):
         if operation["op"] == "status" and str(operation.get("id")).startswith("s"):
-            self.told.put(operation)
+            self.operations.put(operation)
         else:
             super()._sort(operation)
 
@@ -237,22 +237,22 @@ class Program:
 class PlainServer(RosbridgePartner):
     """A server for one program of ours: carries between it and the test."""
 
-    def __init__(self, websocket, reading, orders):
-        self._orders = orders
+    def __init__(self, websocket, reading, requests):
+        self._requests = requests
         super().__init__(websocket, "cbor", reading)
 
     def advertise(self, topic, msgtype=STRING, *, latched=False):
-        until(lambda: ("subscribe", topic) in self._orders)
+        until(lambda: ("subscribe", topic) in self._requests)
 
     def subscribe(self, topic, msgtype=STRING):
         self._kinds[topic] = msgtype
-        until(lambda: ("advertise", topic) in self._orders)
+        until(lambda: ("advertise", topic) in self._requests)
 
     def create_service(self, service):
         self._offered.add(service)
 
     def call(self, service):
-        until(lambda: ("advertise_service", service) in self._orders)
+        until(lambda: ("advertise_service", service) in self._requests)
         return super().call(service)
 
     def settle(self):
@@ -260,7 +260,7 @@ class PlainServer(RosbridgePartner):
 
     def _sort(self, operation):
         if "subscribe" in operation["op"] or "advertise" in operation["op"]:
-            self._orders.add((operation["op"], operation.get("topic", operation.get("service"))))
+            self._requests.add((operation["op"], operation.get("topic", operation.get("service"))))
         else:
             super()._sort(operation)
 
@@ -272,7 +272,7 @@ class ClientBench(Bench):
         {
             "others": "a program has one server",
             "late joiners": "the server keeps what is latched",
-            "errors": "a program notes what is wrong with its server, and tells it nothing",
+            "errors": "a program notes what is wrong with its server, and reports nothing to it",
             "own types": "the program names the types",
             "advertising": "servers announce nothing to their clients",
             "reliability": "servers do not subscribe",
@@ -290,7 +290,7 @@ class ClientBench(Bench):
         self._server = self._serve(0)
         self._port = self._server.socket.getsockname()[1]
         self.ours = Program(
-            RosbridgeClient(f"ws://127.0.0.1:{self._port}", connect_timeout_s=PATIENCE_S)
+            RosbridgeClient(f"ws://127.0.0.1:{self._port}", connect_timeout_s=TIMEOUT_S)
         )
 
     def _serve(self, port):
@@ -305,7 +305,7 @@ class ClientBench(Bench):
         return server
 
     def _connect(self, reading):
-        return PlainServer(self._accepted.get(timeout=PATIENCE_S), reading, set())
+        return PlainServer(self._accepted.get(timeout=TIMEOUT_S), reading, set())
 
     def close(self):
         self.ours.close()

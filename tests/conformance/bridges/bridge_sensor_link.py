@@ -9,7 +9,7 @@ import struct
 import threading
 from types import MappingProxyType
 
-from bridge_bench import IMAGE, PATIENCE_S, Bench, Client, reset
+from bridge_bench import IMAGE, TIMEOUT_S, Bench, Client, reset
 from ros_tcp_client import until
 
 from volery.bridges.sensor_link.server import SensorLink
@@ -48,7 +48,7 @@ class LinkClient(Client):
         sock = socket.socket()
         if not reading:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        sock.settimeout(2 * PATIENCE_S)
+        sock.settimeout(2 * TIMEOUT_S)
         sock.connect(("127.0.0.1", port))
         if reading:
             self._readers[sock] = threading.Thread(target=self._read, args=(sock,), daemon=True)
@@ -68,7 +68,7 @@ class LinkClient(Client):
         self.sock.sendall(pose_command(1.0, data))
 
     def settle(self):
-        """Frames of no known type are told of, in the order of arrival."""
+        """Frames of no known type are reported, in the order of arrival."""
         self.sock.sendall(frame(200, 1, b""))
         while "type 200" not in self.error():
             pass
@@ -152,8 +152,8 @@ class SensorLinkBench(Bench):
 
     def _connect(self, reading):
         client = LinkClient(self.bridge.port, self.bridge.image_port, reading)
-        places = {f"127.0.0.1:{s.getsockname()[1]}" for s in (client.sock, client.images)}
-        until(lambda: places <= {info.name.split()[-1] for info in self.bridge.clients})
+        addresses = {f"127.0.0.1:{s.getsockname()[1]}" for s in (client.sock, client.images)}
+        until(lambda: addresses <= {info.name.split()[-1] for info in self.bridge.clients})
         until(lambda: self._ranges.has_subscribers and self._images.has_subscribers)
         return client
 

@@ -1,11 +1,11 @@
 """A plain DDS program that speaks as a ROS 2 node does. It shares no code with the bridge.
 
-It runs as a process of its own and does what comes as lines of JSON on stdin; what it hears goes to
-stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.
+It runs as a process of its own and does what comes as lines of JSON on stdin; what it receives goes
+to stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.
 
     {"op": "subscribe", "topic": "/chatter", "type": "std_msgs/msg/String"}
 
-What it has it gives up with `{"op": "leave"}`, and can be somebody else then.
+What it has it gives up with `{"op": "leave"}`, and can be another node then.
 """
 
 import base64
@@ -44,8 +44,8 @@ CONFIG = """<CycloneDDS><Domain id="any">
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
 MATCH_S = 600.0
-PICTURE_HEAD = 1000
-"""Bytes of a picture that are reported. A pipe takes a line below 4096 bytes as one: a process that
+IMAGE_HEAD = 1000
+"""Bytes of an image that are reported. A pipe takes a line below 4096 bytes as one: a process that
 is stopped while it writes leaves no half line."""
 
 
@@ -130,13 +130,13 @@ class Peer:
     def __init__(self, domain_id, lease_s):
         self.domain_id = domain_id
         self.domain = Domain(domain_id, CONFIG.format(lease=lease_s))
-        self.told = threading.Lock()
+        self.output_lock = threading.Lock()
         self.library = ctypes.CDLL(str(library_path))
         self.join()
 
     def join(self):
         self.participant = DomainParticipant(self.domain_id)
-        self.writers, self.askers, self.hearers, self.leaving = {}, {}, [], False
+        self.writers, self.askers, self.readers, self.leaving = {}, {}, [], False
         self.waitset = WaitSet(self.participant)
         self.listener = threading.Thread(target=self.listen, daemon=True)
         self.listener.start()
@@ -148,28 +148,28 @@ class Peer:
         self.join()
         return True
 
-    def tell(self, **fields):
-        with self.told:
+    def report(self, **fields):
+        with self.output_lock:
             sys.stdout.write(json.dumps(fields) + "\n")
             sys.stdout.flush()
 
     def listen(self):
         while not self.leaving:
-            if not self.hearers:
+            if not self.readers:
                 time.sleep(0.02)
                 continue
             self.waitset.wait(duration(milliseconds=50))
-            for reader, hear in tuple(self.hearers):
+            for reader, take in tuple(self.readers):
                 for sample in reader.take(100):
                     if sample.sample_info.valid_data:
-                        hear(sample.raw)
+                        take(sample.raw)
 
     def write(self, writer, kind, data):
         writer.write(kind.deserialize(data))
 
-    def hear(self, topic, kind, take, quality):
+    def add_reader(self, topic, kind, take, quality):
         reader = DataReader(self.participant, Topic(self.participant, topic, kind), qos=quality)
-        self.hearers.append((reader, take))
+        self.readers.append((reader, take))
         any_state = ViewState.Any | InstanceState.Any | SampleState.NotRead
         self.waitset.attach(ReadCondition(reader, any_state))
         return reader
@@ -213,12 +213,12 @@ class Peer:
 
     def subscribe(self, topic, type, reliable, latched):
         def take(raw):
-            told = raw[:PICTURE_HEAD] if kind is Image_ else raw
-            self.tell(heard=topic, data=base64.b64encode(told).decode(), size=len(raw))
+            content = raw[:IMAGE_HEAD] if kind is Image_ else raw
+            self.report(topic=topic, data=base64.b64encode(content).decode(), size=len(raw))
 
         kind = TYPES[type]
         quality = qos(reliable=reliable, latched=latched)
-        reader = self.hear(f"rt{topic}", kind, take, quality)
+        reader = self.add_reader(f"rt{topic}", kind, take, quality)
         return self.matched(reader.get_matched_publications)
 
     def call(self, service):
@@ -233,7 +233,7 @@ class Peer:
         header = struct.pack("<Qq", 77, time.monotonic_ns())
         quality = qos(user_data=b"clientid=1.2.3;")
         writer = self.speak(f"rq{service}Request", Request_, quality)
-        reader = self.hear(f"rr{service}Reply", Response_, take, quality)
+        reader = self.add_reader(f"rr{service}Reply", Response_, take, quality)
         self.askers[service] = writer
         both = self.matched(
             lambda: writer.get_matched_subscriptions() and reader.get_matched_publications()
@@ -241,7 +241,7 @@ class Peer:
         if both:
             self.write(writer, Request_, b"\0\1\0\0" + header + b"\0")
             come.wait(MATCH_S)
-        self.hearers = [known for known in self.hearers if known[0] is not reader]
+        self.readers = [known for known in self.readers if known[0] is not reader]
         return base64.b64encode(found[0]).decode() if found else None
 
     def outlive(self, service):
@@ -257,18 +257,18 @@ class Peer:
                 body = base64.b64decode(answer)
                 self.write(writer, Response_, body[:4] + raw[4:20] + body[4:])
 
-        self.hear(f"rq{service}Request", Request_, take, quality)
+        self.add_reader(f"rq{service}Request", Request_, take, quality)
         self.writers[f"service {service}"] = writer, Response_
         return self.matched(writer.get_matched_subscriptions)
 
 
 def main():
     peer = Peer(int(sys.argv[1]), float(sys.argv[2]))
-    peer.tell(ready=True)
+    peer.report(ready=True)
     for line in sys.stdin:
         fields = json.loads(line)
         operation = fields.pop("op")
-        peer.tell(done=getattr(peer, operation)(**fields))
+        peer.report(done=getattr(peer, operation)(**fields))
 
 
 if __name__ == "__main__":

@@ -94,9 +94,9 @@ class PlainNode:
         host, port = uri.removeprefix("rosrpc://").rstrip("/").split(":")
         with socket.create_connection((host, int(port)), 10.0) as sock, sock.makefile("rb") as file:
             fields = {"service": service, "type": kind, "md5sum": md5 or SUMS[kind]}
-            answer = self._greet(sock, file, **fields)
-            if "error" in answer:
-                raise ConnectionError(answer["error"])
+            response = self._greet(sock, file, **fields)
+            if "error" in response:
+                raise ConnectionError(response["error"])
             sock.sendall(struct.pack("<I", len(request)) + request)
             well = _exactly(file, 1)
             body = _exactly(file, *struct.unpack("<I", _exactly(file, 4)))
@@ -104,20 +104,20 @@ class PlainNode:
                 raise ConnectionError(body.decode(errors="replace"))
             return body
 
-    def create_service(self, service, kind, answer):
-        """Offer a service that always answers the same bytes, or never if they are None."""
-        self._services[service] = (kind, answer)
+    def create_service(self, service, kind, response):
+        """Create a service that always responds with the same bytes, or never if they are None."""
+        self._services[service] = (kind, response)
         address = f"rosrpc://127.0.0.1:{self._port}"
         self.master.registerService(self.name, service, address, self.uri)
         self._registered.append(("unregisterService", service, address))
 
     # ---------------------------------------------------------------------------------------- end
 
-    def close(self, *, farewell=True):
-        """Leave; without farewell the master is told nothing, and connections are reset."""
+    def close(self, *, unregister=True):
+        """Leave; unless `unregister`, the master is not informed, and connections are reset."""
         if self._listener.fileno() < 0:
             return
-        for method, name, where in self._registered if farewell else ():
+        for method, name, where in self._registered if unregister else ():
             with contextlib.suppress(OSError):
                 getattr(self.master, method)(self.name, name, where)
         self._server.shutdown()
@@ -150,7 +150,7 @@ class PlainNode:
         self._connected.add((topic, uri))
         with contextlib.suppress(OSError, EOFError):
             with ServerProxy(uri) as publisher:
-                code, text, place = publisher.requestTopic(self.name, topic, [["TCPROS"]])
+                code, text, address = publisher.requestTopic(self.name, topic, [["TCPROS"]])
             if code != 1:
                 self._connected.discard((topic, uri))
                 self._refused(text)
@@ -159,11 +159,11 @@ class PlainNode:
             self._sockets.append(sock)
             if not reading:
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            sock.connect((place[1], place[2]))
+            sock.connect((address[1], address[2]))
             with sock.makefile("rb") as file:
-                answer = self._greet(sock, file, topic=topic, type=kind, md5sum=md5)
-                if "error" in answer:
-                    self._refused(answer["error"])
+                response = self._greet(sock, file, topic=topic, type=kind, md5sum=md5)
+                if "error" in response:
+                    self._refused(response["error"])
                     return
                 while reading:
                     data = _exactly(file, *struct.unpack("<I", _exactly(file, 4)))
@@ -184,15 +184,15 @@ class PlainNode:
         with contextlib.suppress(OSError, EOFError), sock.makefile("rb") as file:
             asked = _read_header(file)
             if "service" in asked:
-                kind, answer = self._services[asked["service"]]
+                kind, response = self._services[asked["service"]]
                 sock.sendall(_header({"callerid": self.name, "type": kind, "md5sum": SUMS[kind]}))
                 if asked.get("probe") == "1":
                     return
                 _exactly(file, *struct.unpack("<I", _exactly(file, 4)))
-                if answer is None:
+                if response is None:
                     file.read(1)  # until the caller gives up
                 else:
-                    sock.sendall(b"\1" + struct.pack("<I", len(answer)) + answer)
+                    sock.sendall(b"\1" + struct.pack("<I", len(response)) + response)
                 return
             publication = self._published[asked["topic"]]
             if asked["md5sum"] not in ("*", publication.md5):

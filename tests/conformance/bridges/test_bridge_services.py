@@ -16,7 +16,7 @@ def test_a_service_of_ours(bench, client):
 
 
 @pytest.mark.needs("services", "advertising")
-def test_a_service_that_nobody_offers_is_told(bench, client):
+def test_a_service_without_server_is_reported(bench, client):
     bench.ours.create_service("/ours", "x")
     client.call("/ours")
     bench.ours.live.graph.destroy_service("/ours")
@@ -29,14 +29,14 @@ def test_a_service_of_the_client(bench, client):
     client.create_service(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     for _ in range(2):
-        answer = bench.ours.call(bench.remote_service).get(timeout=60.0)
-        assert answer.message == client.their_answer
+        response = bench.ours.call(bench.remote_service).get(timeout=60.0)
+        assert response.message == client.their_response
 
 
 @pytest.mark.needs("services of clients")
 @pytest.mark.parametrize("how", ["reset", "close"])
 def test_a_service_whose_client_left_fails_at_once(bench, client, how):
-    client.their_answer = None
+    client.their_response = None
     client.create_service(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     come = bench.ours.call(bench.remote_service)

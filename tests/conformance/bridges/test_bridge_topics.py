@@ -73,7 +73,7 @@ def test_large_messages_come_in(bench, client):
 
 
 @pytest.mark.needs("late joiners")
-def test_who_joins_late_finds_what_was_latched(bench, client):
+def test_late_subscribers_receive_latched_messages(bench, client):
     publish = bench.ours.publisher("/map", latched=True)
     publish(m.String("old"))
     publish(m.String("kept"))

@@ -10,15 +10,15 @@ from volery.learning.training import evaluate
 from volery.learning.training.configuration import load_configuration
 
 
-@pytest.mark.parametrize(("name", "least"), [("hover", 0.95), ("homing", 0.95)])
-def test_a_baseline_succeeds_on_unseen_seeds(name, least):
-    assert evaluate(name, episodes=60, seed=10_000, threads=1).success >= least
+@pytest.mark.parametrize(("name", "min_success"), [("hover", 0.95), ("homing", 0.95)])
+def test_a_baseline_succeeds_on_unseen_seeds(name, min_success):
+    assert evaluate(name, episodes=60, seed=10_000, threads=1).success >= min_success
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "least"), [("tracking", 0.95), ("gates", 0.9)])
-def test_a_longer_baseline_succeeds_on_unseen_seeds(name, least):
-    assert evaluate(name, episodes=30, seed=20_000, threads=1).success >= least
+@pytest.mark.parametrize(("name", "min_success"), [("tracking", 0.95), ("gates", 0.9)])
+def test_a_longer_baseline_succeeds_on_unseen_seeds(name, min_success):
+    assert evaluate(name, episodes=30, seed=20_000, threads=1).success >= min_success
 
 
 @pytest.mark.slow

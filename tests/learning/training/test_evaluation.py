@@ -64,8 +64,8 @@ def test_seed_and_repetition_decide_the_result():
     other.close()
 
 
-def test_each_environment_runs_its_share(monkeypatch):
-    monkeypatch.setattr("volery.learning.training.evaluation._MOST_ENVS", 3)
+def test_each_environment_runs_its_part(monkeypatch):
+    monkeypatch.setattr("volery.learning.training.evaluation._MAX_ENVS", 3)
     counts = []
     found = evaluate_actions(
         load_task("homing"), towards_the_goal, 7, threads=1, on_decision=counts.append
@@ -78,8 +78,8 @@ def test_seeds_are_apart_from_those_of_training():
     from volery.learning.training.configuration import TrainingConfiguration
     from volery.learning.training.trainer import SEED_SPACING
 
-    most = next(
+    limit = next(
         m.lt for m in TrainingConfiguration.model_fields["seed"].metadata if hasattr(m, "lt")
     )
-    assert most * SEED_SPACING <= VALIDATION_SEEDS
+    assert limit * SEED_SPACING <= VALIDATION_SEEDS
     assert VALIDATION_SEEDS + (1 << 30) < TEST_SEEDS

@@ -74,20 +74,20 @@ class FakeUav:
 
     def __init__(self, bench: TeamBench, name: str, home: tuple[float, float]) -> None:
         self._bench, self.name = bench, name
-        self.place = np.array([*home, 0.0])
+        self.position = np.array([*home, 0.0])
         self.flies = False
         self.stuck = False
         self.silent = False
         self.charge = 1.0
-        self.reaches_m = np.inf
+        self.climb_limit_m = np.inf
         """Height at which a take-off ends, if not at the one that is asked for."""
         self.asked: list[str] = []
         """Flight modes that were asked for."""
         self.paused = False
-        """Whether its planners are told to command nothing."""
+        """Whether its planners are paused, so that they command nothing."""
         self.frame = "map"
         """Of its odometry."""
-        self.way: list[np.ndarray] = []
+        self.waypoints: list[np.ndarray] = []
         graph = bench.graph
         self.odometry = graph.advertise(f"/{name}/odom", Odometry)
         self.battery = graph.advertise(f"/{name}/battery", BatteryState)
@@ -96,7 +96,7 @@ class FakeUav:
 
         def take_off(request: Any) -> Any:
             self.asked.append("take_off_to")
-            self.flies, self.place[2] = True, min(request.altitude, self.reaches_m)
+            self.flies, self.position[2] = True, min(request.altitude, self.climb_limit_m)
             return rise(True, "")
 
         def hold(_request: Any) -> Any:
@@ -105,7 +105,7 @@ class FakeUav:
 
         def land(_request: Any) -> Any:
             self.asked.append("land")
-            self.flies, self.place[2] = False, 0.0
+            self.flies, self.position[2] = False, 0.0
             return trigger(True, "")
 
         graph.create_service(f"/{name}/take_off_to", "volery_interfaces/srv/TakeOffTo", take_off)
@@ -120,24 +120,24 @@ class FakeUav:
 
     def _pause(self, published: Published) -> None:
         self.paused = published.message.data
-        self.way = []
+        self.waypoints = []
 
     def _sweep(self, published: Published) -> None:
         corners = published.message.polygon.points
-        self.way = []
+        self.waypoints = []
         if corners:
             (x0, y0), (x1, y1) = ((corners[k].x, corners[k].y) for k in (0, 2))
             for k, y in enumerate(np.arange(y0 + _LANE_M / 2.0, y1, _LANE_M)):
                 ends = (x0, x1) if k % 2 == 0 else (x1, x0)
-                self.way += [np.array([x, y]) for x in ends]
+                self.waypoints += [np.array([x, y]) for x in ends]
 
     def _go(self, published: Published) -> None:
         p = published.message.pose.position
-        self.way = [np.array([p.x, p.y])]
+        self.waypoints = [np.array([p.x, p.y])]
 
     def _climb(self, published: Published) -> None:
         if self.flies:
-            self.place[2] += _MOVE_S * published.message.linear.z
+            self.position[2] += _MOVE_S * published.message.linear.z
 
     def measure(self, range_m: float) -> None:
         """Say what the sonar measures."""
@@ -147,16 +147,16 @@ class FakeUav:
 
     def _move(self) -> None:
         step = _MOVE_S * _SPEED_M_S
-        if self.flies and self.way and not self.stuck and not self.paused:
-            to = self.way[0] - self.place[:2]
+        if self.flies and self.waypoints and not self.stuck and not self.paused:
+            to = self.waypoints[0] - self.position[:2]
             away = float(np.linalg.norm(to))
-            self.place[:2] += to * min(step / max(away, 1e-9), 1.0)
+            self.position[:2] += to * min(step / max(away, 1e-9), 1.0)
             if away <= step:
-                self.way.pop(0)
+                self.waypoints.pop(0)
         if self.silent:
             return
         now = self._bench.clock.now_ns
-        pose = Pose(Point(*self.place.tolist()), Quaternion(0.0, 0.0, 0.0, 1.0))
+        pose = Pose(Point(*self.position.tolist()), Quaternion(0.0, 0.0, 0.0, 1.0))
         still = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)), _NOTHING)
         message = Odometry(
             header(now, self.frame), "base", PoseWithCovariance(pose, _NOTHING), still
@@ -168,10 +168,10 @@ class FakeUav:
 
 
 class TeamBench:
-    """UAVs whose `team` topics reach the others unless `hears(from, to)` says no.
+    """UAVs whose `team` topics reach the others unless `is_connected(from, to)` says no.
 
-    lost: share of reports that is lost, each by itself; doubled: share that comes twice, the second
-    time a second late.
+    lost: fraction of reports that is lost, each by itself; doubled: fraction that comes twice, the
+    second time a second late.
     """
 
     def __init__(
@@ -181,8 +181,8 @@ class TeamBench:
         self.graph = Graph(lambda: self.clock.now_ns)
         self.uavs: dict[str, FakeUav] = {}
         self.managers: dict[str, TaskManager] = {}
-        self.hears: Callable[[str, str], bool] = lambda _one, _other: True
-        self._lost, self._doubled, self._told = lost, doubled, 0
+        self.is_connected: Callable[[str, str], bool] = lambda _one, _other: True
+        self._lost, self._doubled, self._num_reports = lost, doubled, 0
         for name, home in homes.items():
             self.add(name, home)
 
@@ -215,16 +215,16 @@ class TeamBench:
     def _relay(self, source: str, published: Published) -> None:
         key = rng.stream_key(1, "team bench")
         for name in self.uavs:
-            if name == source or not self.hears(source, name):
+            if name == source or not self.is_connected(source, name):
                 continue
-            self._told += 1
-            hear = self._hearer(name, published.message)
-            if float(rng.uniform(key, 2 * self._told)) >= self._lost:
-                self.clock.at(self.clock.now_ns + 5_000_000, hear)
-            if float(rng.uniform(key, 2 * self._told + 1)) < self._doubled:
-                self.clock.at(self.clock.now_ns + S, hear)
+            self._num_reports += 1
+            deliver = self._delivery(name, published.message)
+            if float(rng.uniform(key, 2 * self._num_reports)) >= self._lost:
+                self.clock.at(self.clock.now_ns + 5_000_000, deliver)
+            if float(rng.uniform(key, 2 * self._num_reports + 1)) < self._doubled:
+                self.clock.at(self.clock.now_ns + S, deliver)
 
-    def _hearer(self, name: str, message: Any) -> Callable[[], None]:
+    def _delivery(self, name: str, message: Any) -> Callable[[], None]:
         topic = f"/{name}/radio/team"
         publisher = self.graph.advertise(topic, "volery_interfaces/msg/TeamReport")
         return lambda: publisher.publish(message)

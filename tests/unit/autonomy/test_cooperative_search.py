@@ -12,7 +12,12 @@ from hypothesis import strategies as st
 
 from volery.autonomy.search.calls import JOIN
 from volery.autonomy.search.cooperative_search import CooperativeSearch
-from volery.autonomy.search.search_positions import Area, check_room, places_around, random_waypoint
+from volery.autonomy.search.search_positions import (
+    Area,
+    check_room,
+    positions_around,
+    random_waypoint,
+)
 from volery.autonomy.search.teammates import SearchPhase
 from volery.core import rng
 from volery.core.errors import GraphError
@@ -61,13 +66,13 @@ class Bodies:
         self.timers = []
         self.object = OBJECT
         self.rotors_turn = True
-        self.place = {n: np.array([2.0 + 4.0 * k, 2.0, 0.0]) for k, n in enumerate(team)}
+        self.position = {n: np.array([2.0 + 4.0 * k, 2.0, 0.0]) for k, n in enumerate(team)}
         self.velocity = {n: np.zeros(3) for n in team}
         self.climb_to = dict.fromkeys(team)
         self.sees = set(team)
         self.tracks = {n: [] for n in team}
         self.phases = {n: [] for n in team}
-        self.nodes, self.odometry, self.pictures = {}, {}, {}
+        self.nodes, self.odometry, self.cameras = {}, {}, {}
         self.parameters = {
             "team": team,
             "area_m": AREA,
@@ -85,14 +90,14 @@ class Bodies:
     def add_body(self, name):
         graph = self.graph
         self.odometry[name] = graph.advertise(f"/{name}/odom", Odometry)
-        self.pictures[name] = (
+        self.cameras[name] = (
             graph.advertise(f"/{name}/down/camera_info", CameraInfo, latched=True),
             graph.advertise(f"/{name}/down/image_raw", Image),
         )
         info = zero_message("sensor_msgs/msg/CameraInfo")
         middle = (SIDE - 1) / 2
         info.k = np.array([FOCAL, 0, middle, 0, FOCAL, middle, 0, 0, 1.0])
-        self.pictures[name][0].publish(info)
+        self.cameras[name][0].publish(info)
         self.offer(name, "volery_interfaces/srv/TakeOffTo", "take_off_to", self.take_off)
         self.offer(name, "std_srvs/srv/Trigger", "land", self.land)
         graph.subscribe(
@@ -114,7 +119,7 @@ class Bodies:
 
     def take_off(self, name, request):
         if self.rotors_turn:
-            self.climb_to[name] = self.place[name][2] + request.altitude
+            self.climb_to[name] = self.position[name][2] + request.altitude
 
     def land(self, name, _request):
         self.climb_to[name] = 0.0
@@ -127,22 +132,24 @@ class Bodies:
     def move(self, name):
         goal = self.climb_to[name]
         if goal is not None:
-            self.velocity[name] = np.array([0.0, 0.0, np.clip(goal - self.place[name][2], -1, 1)])
-            if abs(goal - self.place[name][2]) < 1e-3:
+            self.velocity[name] = np.array(
+                [0.0, 0.0, np.clip(goal - self.position[name][2], -1, 1)]
+            )
+            if abs(goal - self.position[name][2]) < 1e-3:
                 self.velocity[name][:] = 0.0
                 if goal > 0.0:
                     self.climb_to[name] = None
-        self.place[name] = self.place[name] + self.velocity[name] * 0.1
-        if goal is not None and abs(goal - self.place[name][2]) < 0.1:
-            self.place[name][2] = goal
+        self.position[name] = self.position[name] + self.velocity[name] * 0.1
+        if goal is not None and abs(goal - self.position[name][2]) < 0.1:
+            self.position[name][2] = goal
 
     def crash(self, name):
-        self.place[name][2] = 0.0
+        self.position[name][2] = 0.0
         self.climb_to[name] = 0.0
 
-    def picture(self, name):
-        """What a camera that looks down, its top ahead (+x), has of a red square of 1 m."""
-        x, y, z = self.place[name]
+    def image(self, name):
+        """Returns the image of a red square of 1 m by a camera that looks down, top ahead (+x)."""
+        x, y, z = self.position[name]
         data = np.full((SIDE, SIDE, 3), 90, np.uint8)
         if z > 1.0 and name in self.sees:
             v, u = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) / 2
@@ -153,22 +160,22 @@ class Bodies:
 
     def step(self):
         self.now_ns += STEP_NS
-        for name in self.place:
+        for name in self.position:
             self.move(name)
             message = zero_message("nav_msgs/msg/Odometry")
             message.header = header(self.now_ns, "")
-            message.pose.pose.position = Point(*self.place[name].tolist())
+            message.pose.pose.position = Point(*self.position[name].tolist())
             message.pose.pose.orientation.w = 1.0
             twist = message.twist.twist.linear
             twist.x, twist.y, twist.z = self.velocity[name].tolist()
             self.odometry[name].publish(message)
-            self.pictures[name][1].publish(self.picture(name))
+            self.cameras[name][1].publish(self.image(name))
         self.graph.deliver()
         for ring in self.timers:
             ring()
             self.graph.deliver()
         for name, node in self.nodes.items():
-            self.tracks[name].append(self.place[name].copy())
+            self.tracks[name].append(self.position[name].copy())
             self.phases[name].append(node.phase)
 
     def run_until(self, condition, seconds=300.0):
@@ -185,11 +192,11 @@ class Bodies:
     def all_in(self, *phases):
         return lambda: all(node.phase in phases for node in self.nodes.values())
 
-    def call(self, name, finder, stamp_ns=0, place=(25.0, 15.0, 0.5)):
-        request = message_type(f"{JOIN}_Request")(time_from_ns(stamp_ns), finder, Point(*place))
+    def call(self, name, finder, stamp_ns=0, position=(25.0, 15.0, 0.5)):
+        request = message_type(f"{JOIN}_Request")(time_from_ns(stamp_ns), finder, Point(*position))
         return self.graph.call(f"/{name}/search/join", request)
 
-    def least_distance(self):
+    def min_distance(self):
         tracks = [np.array(track) for track in self.tracks.values()]
         pairs = itertools.combinations(tracks, 2)
         return min(np.linalg.norm(a - b, axis=1).min() for a, b in pairs)
@@ -203,36 +210,36 @@ def searching(**parameters):
 
 def test_one_finds_all_come_and_land_where_they_took_off():
     bodies = Bodies()
-    homes = copy.deepcopy(bodies.place)
+    homes = copy.deepcopy(bodies.position)
     found = []
     for name in TEAM:
         bodies.graph.subscribe(
             f"/{name}/search/found", lambda p: found.append(p.message.point), PointStamped
         )
     bodies.run_until(bodies.all_in(SearchPhase.HOLD))
-    places = np.array([bodies.place[name] for name in TEAM])
+    positions = np.array([bodies.position[name] for name in TEAM])
     bodies.run_until(bodies.all_in(SearchPhase.DONE))
     assert np.linalg.norm([found[0].x - 25.0, found[0].y - 15.0]) < 0.3
-    away = np.linalg.norm(places[:, :2] - OBJECT, axis=1)
+    away = np.linalg.norm(positions[:, :2] - OBJECT, axis=1)
     assert (away > 2.0).all()
     assert (away < 5.0).all()
-    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(places[:, :2], 2)]
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(positions[:, :2], 2)]
     assert min(apart) > 2.0
     for name in TEAM:
-        assert np.linalg.norm(bodies.place[name] - homes[name]) < 1.0
-    assert bodies.least_distance() > 1.5
+        assert np.linalg.norm(bodies.position[name] - homes[name]) < 1.0
+    assert bodies.min_distance() > 1.5
     inside = np.vstack(list(bodies.tracks.values()))
     assert (inside[:, :2] >= 0.0).all()
     assert (inside[:, :2] <= 40.0).all()
 
 
-def test_nobody_leaves_its_column_while_another_climbs_or_sinks():
+def test_no_uav_leaves_its_column_while_another_climbs_or_sinks():
     bodies = Bodies()
     bodies.run_until(bodies.all_in(SearchPhase.DONE))
     for now in zip(*bodies.phases.values(), strict=True):
-        under_way = {SearchPhase.SEARCH, SearchPhase.LOOK, SearchPhase.COME, SearchPhase.HOLD}
-        assert not (SearchPhase.CLIMB in now and under_way & set(now))
-        assert not (SearchPhase.LAND in now and (under_way | {SearchPhase.HOME}) & set(now))
+        flying = {SearchPhase.SEARCH, SearchPhase.LOOK, SearchPhase.COME, SearchPhase.HOLD}
+        assert not (SearchPhase.CLIMB in now and flying & set(now))
+        assert not (SearchPhase.LAND in now and (flying | {SearchPhase.HOME}) & set(now))
 
 
 def test_the_earlier_of_two_finds_counts_whatever_comes_first():
@@ -268,7 +275,7 @@ def test_a_second_call_of_the_same_find_changes_nothing():
 def test_two_that_find_it_at_once_agree():
     bodies = searching()
     for name in ("uav1", "uav3"):
-        bodies.place[name][:2] = OBJECT + 1.0
+        bodies.position[name][:2] = OBJECT + 1.0
     bodies.run_until(bodies.all_in(SearchPhase.HOLD))
     assert {node.claim.key for node in bodies.nodes.values()} == {bodies.nodes["uav1"].claim.key}
     assert bodies.nodes["uav3"].claim.finder == "uav1"
@@ -286,7 +293,7 @@ def test_a_call_while_it_climbs_is_followed_afterwards():
 
 
 @pytest.mark.parametrize(
-    ("finder", "place", "reason"),
+    ("finder", "position", "reason"),
     [
         ("uav9", (25.0, 15.0, 0.0), "not in the team"),
         ("uav1", (25.0, 15.0, 0.0), "not in the team"),
@@ -295,15 +302,15 @@ def test_a_call_while_it_climbs_is_followed_afterwards():
         ("uav2", (float("nan"), 15.0, 0.0), "area"),
     ],
 )
-def test_calls_that_are_refused(finder, place, reason):
+def test_calls_that_are_refused(finder, position, reason):
     bodies = searching()
-    answer = bodies.call("uav1", finder, 5, place)
+    answer = bodies.call("uav1", finder, 5, position)
     assert not answer.accepted
     assert reason in answer.message
     assert bodies.nodes["uav1"].phase is SearchPhase.SEARCH
 
 
-def test_who_is_down_refuses_and_is_not_waited_for():
+def test_a_uav_that_is_down_refuses_and_is_not_waited_for():
     bodies = searching()
     bodies.crash("uav3")
     bodies.run_until(lambda: bodies.nodes["uav3"].phase is SearchPhase.DOWN)
@@ -323,13 +330,13 @@ def test_an_absent_teammate_is_waited_for_on_the_ground_and_called_in_vain():
     )
 
 
-def test_who_comes_late_stays_on_the_ground():
+def test_a_uav_that_comes_late_stays_on_the_ground():
     bodies = Bodies(starts=["uav1", "uav2"])
     bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.SEARCH)
     bodies.start("uav3")
     bodies.run(3.0)
     assert bodies.nodes["uav3"].phase is SearchPhase.LATE
-    assert bodies.place["uav3"][2] == 0.0
+    assert bodies.position["uav3"][2] == 0.0
 
 
 def test_a_service_that_never_answers_is_called_again_and_given_up():
@@ -369,7 +376,7 @@ def test_finish_at_one_ends_it_for_all():
     assert "no longer takes part" in bodies.call("uav1", "uav2").message
 
 
-def test_who_cannot_be_told_sees_the_others_go_home():
+def test_a_uav_without_a_finish_service_sees_the_others_go_home():
     bodies = searching()
     bodies.sees.clear()
     for name in ("uav1", "uav3"):
@@ -406,13 +413,13 @@ def test_a_vain_search_ends_in_time():
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 90.0)
 
 
-def test_without_pictures_it_stops():
+def test_without_images_it_stops():
     bodies = searching()
-    bodies.picture = lambda _: Image(header(0, ""), 1, 1, "rgb8", 0, 3, np.zeros(3, np.uint8))
+    bodies.image = lambda _: Image(header(0, ""), 1, 1, "rgb8", 0, 3, np.zeros(3, np.uint8))
     bodies.run(3.0)
     assert all(np.linalg.norm(v) > 1.0 for v in bodies.velocity.values())
-    for _, pictures in bodies.pictures.values():
-        pictures.cancel()
+    for _, images in bodies.cameras.values():
+        images.cancel()
     bodies.run(4.0)
     assert all(np.linalg.norm(v) < 0.1 for v in bodies.velocity.values())
 
@@ -421,16 +428,16 @@ def test_a_kept_state_is_gone_back_to():
     bodies = searching()
     bodies.run_until(lambda: any(n.phase is SearchPhase.COME for n in bodies.nodes.values()))
     kept = copy.deepcopy([node.get_state() for node in bodies.nodes.values()])
-    graph, places = bodies.graph.get_state(), copy.deepcopy((bodies.place, bodies.velocity))
+    graph, motion = bodies.graph.get_state(), copy.deepcopy((bodies.position, bodies.velocity))
     now_ns = bodies.now_ns
 
     def fly_on():
         bodies.run(8.0)
-        return np.array([bodies.place[name] for name in TEAM])
+        return np.array([bodies.position[name] for name in TEAM])
 
     once = fly_on()
     bodies.now_ns = now_ns
-    bodies.place, bodies.velocity = places
+    bodies.position, bodies.velocity = motion
     bodies.graph.set_state(graph)
     for node, state in zip(bodies.nodes.values(), kept, strict=True):
         node.set_state(state)
@@ -475,14 +482,14 @@ def test_waypoints_fill_the_area_and_nothing_else():
     st.floats(0.0, 1.0),
     st.floats(0.0, 1.0),
 )
-def test_there_is_room_around_every_place(count, apart, longer, x, y):
+def test_there_is_room_around_every_position(count, apart, longer, x, y):
     side = next(s for s in itertools.count(1) if _is_roomy(count, apart, float(s)))
     area = Area(3.0, -4.0, 3.0 + side + longer, -4.0 + side)
-    place = np.array([3.0 + x * (side + longer), -4.0 + y * side])
-    places = places_around(place, count, apart, area)
-    assert places.shape == (count, 2)
-    assert all(area.holds(*p) for p in places)
-    everything = np.vstack([place[None], places])
+    position = np.array([3.0 + x * (side + longer), -4.0 + y * side])
+    positions = positions_around(position, count, apart, area)
+    assert positions.shape == (count, 2)
+    assert all(area.holds(*p) for p in positions)
+    everything = np.vstack([position[None], positions])
     away = np.linalg.norm(everything[:, None] - everything, axis=2)
     assert away[~np.eye(count + 1, dtype=bool)].min() > apart * (1.0 - 1e-9)
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from volery.autonomy.coverage.cells import FAR, MOST_CELLS, CoverageCells
+from volery.autonomy.coverage.cells import FAR, MAX_CELLS, CoverageCells
 from volery.autonomy.coverage.components import level_shares
 from volery.autonomy.coverage.field import CoverageField
 from volery.autonomy.coverage.flight import CoverageFlight, CoveragePhase
@@ -22,8 +22,8 @@ from volery_benchmarks.coverage import CASES
 def test_reference_cases_are_divided_within_one_cell(case):
     free, starts = case.free(), case.start_cells()
     plan = plan_coverage(free, starts)
-    most, more = divmod(int(free.sum()), len(starts))
-    assert sorted(plan.shares) == [most] * (len(starts) - more) + [most + 1] * more
+    share, more = divmod(int(free.sum()), len(starts))
+    assert sorted(plan.shares) == [share] * (len(starts) - more) + [share + 1] * more
     assert plan.spread == (1 if more else 0)
     assert [len(route[0].sub_cells) for route in plan.routes] == (4 * plan.shares).tolist()
 
@@ -47,7 +47,7 @@ def test_distances_are_those_of_an_independent_solver():
     cells = CoverageCells.of(free)
     found = cells.distances([0])
     ends, lengths = [], []
-    for k, (row, column) in enumerate(cells.places()):
+    for k, (row, column) in enumerate(cells.rows_and_columns()):
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
             other = cells.number(row + down, column + right)
             passes = (
@@ -63,18 +63,18 @@ def test_distances_are_those_of_an_independent_solver():
     np.testing.assert_allclose(np.where(found == FAR, np.inf, found), expected, rtol=1e-6)
 
 
-def test_a_way_goes_around_what_is_blocked():
+def test_a_path_goes_around_what_is_blocked():
     free = np.ones((5, 5), bool)
     free[1:, 2] = False
     cells = CoverageCells.of(free)
-    way = cells.places()[cells.way(cells.number(4, 0), cells.number(4, 4))]
-    assert way[0].tolist() == [4, 0]
-    assert way[-1].tolist() == [4, 4]
-    assert [0, 2] in way.tolist()
-    assert np.abs(np.diff(way, axis=0)).max() == 1
+    path = cells.rows_and_columns()[cells.path(cells.number(4, 0), cells.number(4, 4))]
+    assert path[0].tolist() == [4, 0]
+    assert path[-1].tolist() == [4, 4]
+    assert [0, 2] in path.tolist()
+    assert np.abs(np.diff(path, axis=0)).max() == 1
 
 
-def test_a_part_without_a_uav_goes_to_the_nearest_who_gets_less_of_its_own():
+def test_a_part_without_a_uav_goes_to_the_nearest_which_gets_less_of_its_own():
     free = np.ones((4, 11), bool)
     free[:, 8] = False  # 32 cells with the UAVs, 8 beyond
     plan = plan_coverage(free, [(0, 0), (0, 7)], flies_over=True)
@@ -104,7 +104,7 @@ def test_loads_are_levelled_as_far_as_that_goes():
         (np.zeros((3, 3), bool), [(0, 0)], "no free cell"),
         (np.zeros((0, 3), bool), [(0, 0)], "rows and columns"),
         (np.ones((3, 3), bool), [], "at least one UAV"),
-        (np.ones((4096, 4096), bool), [(0, 0)], f"at most {MOST_CELLS:,} can be planned"),
+        (np.ones((4096, 4096), bool), [(0, 0)], f"at most {MAX_CELLS:,} can be planned"),
         (np.ones((1, 4096 * 4096 + 1), bool), [(0, 0)], "4096 x 4096"),
     ],
 )
@@ -193,14 +193,14 @@ def test_transits_are_flown_apart_and_around_what_is_blocked():
     tour = CoverageTour(np.array([[8, 8], [8, 9], [9, 9], [9, 8]], np.int32), 4)
     home = np.array([1.0, 9.0, 0.0])
     for uav in (0, 1):
-        way = route_waypoints(
+        waypoints = route_waypoints(
             field, CoverageCells.of(free), HeightProfile(2.0, 1.5, 0.0), uav, home, home, [tour]
         )
-        transit = way.places[~way.covering][:-1]
+        transit = waypoints.positions[~waypoints.covering][:-1]
         np.testing.assert_allclose(transit[:, 2], 2.0 + 1.5 * (uav + 1))
         assert (transit[:, 1] < 2.0).any()  # through the gap in the lowest row
-        np.testing.assert_allclose(way.places[way.covering][:, 2], 2.0)
-        np.testing.assert_allclose(way.places[-1], [1.0, 9.0, 2.0])
+        np.testing.assert_allclose(waypoints.positions[waypoints.covering][:, 2], 2.0)
+        np.testing.assert_allclose(waypoints.positions[-1], [1.0, 9.0, 2.0])
 
 
 def test_a_uav_that_gets_nowhere_is_lost():

@@ -1,4 +1,4 @@
-"""What nodes read from depth pictures: points in space, means of regions."""
+"""What nodes read from depth images: points in space, means of regions."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def info():
 
 
 def pose(rpy=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), time_ns=0):
-    place, speed = np.array(position), np.array(velocity)
-    return OdometrySample(time_ns, place, rotations.from_rpy(*rpy), speed, np.zeros(3))
+    position, speed = np.array(position), np.array(velocity)
+    return OdometrySample(time_ns, position, rotations.from_rpy(*rpy), speed, np.zeros(3))
 
 
 def test_pixels_become_points_where_the_camera_looks():

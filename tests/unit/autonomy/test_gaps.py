@@ -47,7 +47,7 @@ def test_walled_in_means_no_heading():
     st.lists(st.tuples(st.floats(-12, 12), st.floats(-12, 12)), max_size=40),
     st.floats(-3.0, 3.0),
 )
-def test_the_chosen_way_is_clear_as_far_as_promised(points, goal):
+def test_the_chosen_heading_is_clear_as_far_as_promised(points, goal):
     obstacles = np.array(points, dtype=float).reshape(-1, 2)
     heading = choose_heading(free_distances(obstacles, 0.8, 12.0), goal, 40.0, None)
     if heading is None:

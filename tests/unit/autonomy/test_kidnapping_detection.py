@@ -18,17 +18,17 @@ def rng():
 
 
 def forest(rng, per_m2=0.02):
-    """Trunks (K, 2) around the way along x."""
+    """Trunks (K, 2) around the path along x."""
     return rng.uniform([-60.0, -60.0], [60.0, 60.0], (round(per_m2 * 120 * 120), 2))
 
 
-def sweep(trunks, here, reach_m=20.0, radius_m=0.2):
-    """Returns (K, 2) from trunks in reach, in the axes of the place."""
+def sweep(trunks, here, max_range_m=20.0, radius_m=0.2):
+    """Returns points (K, 2) of the trunks in range, relative to `here`."""
     away = trunks - here
     distance = np.hypot(*away.T)
     bearing = np.arctan2(away[:, 1], away[:, 0])
     off = np.abs((BEAMS[:, None] - bearing + np.pi) % (2 * np.pi) - np.pi)
-    met = (distance < reach_m) & (distance * np.sin(np.minimum(off, np.pi / 2)) < radius_m)
+    met = (distance < max_range_m) & (distance * np.sin(np.minimum(off, np.pi / 2)) < radius_m)
     nearest = np.where(met, distance, np.inf).min(1)
     seen = np.isfinite(nearest)
     return nearest[seen, None] * np.stack([np.cos(BEAMS), np.sin(BEAMS)], 1)[seen]

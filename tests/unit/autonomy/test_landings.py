@@ -1,4 +1,4 @@
-"""Nodes that land stop first: a UAV told to land in flight comes down beyond its place."""
+"""Nodes that land stop first: a UAV that lands in flight comes down beyond its position."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ STILL_M_S = 0.3
 
 
 class Flier:
-    """A point that follows `cmd_vel` with an acceleration, and notes where it is told to land."""
+    """A point that follows `cmd_vel` with an acceleration, and notes where a command lands it."""
 
     def __init__(self, bench):
         self.bench = bench
@@ -51,8 +51,8 @@ class Flier:
             last = self._commands[-1].linear
             wanted = np.array([last.x, last.y, last.z])
         change = wanted - self.velocity
-        most = BRAKES_M_S2 * step_s
-        self.velocity += change * min(1.0, most / max(float(np.linalg.norm(change)), 1e-9))
+        max_change = BRAKES_M_S2 * step_s
+        self.velocity += change * min(1.0, max_change / max(float(np.linalg.norm(change)), 1e-9))
         self.position += step_s * self.velocity
         now = self.bench.now_ns + TICK_NS
         self.bench.send("/uav1/odom", odometry(now, self.position, self.velocity))
@@ -92,7 +92,7 @@ def test_gap_following_stops_before_it_lands(bench):
 
 
 def test_gap_following_lands_nowhere_that_has_turned_out_overgrown(bench):
-    """Growth that it sees only when it has stopped makes it choose another place."""
+    """Growth that it sees only when it has stopped makes it choose another position."""
     flier, node = along_a_route(bench)
     while not node._stop.has_begun:
         flier.tick()
@@ -165,15 +165,15 @@ class Searcher(Flier):
             wanted = np.array([0.0, 0.0, 2.0 * (self.height - self.position[2])])
             if self._goals:
                 goal = self._goals[-1].pose.position
-                way = np.array([goal.x, goal.y]) - self.position[:2]
-                wanted[:2] = way * min(2.0, 4.0 / max(float(np.hypot(*way)), 1e-9))
+                offset = np.array([goal.x, goal.y]) - self.position[:2]
+                wanted[:2] = offset * min(2.0, 4.0 / max(float(np.hypot(*offset)), 1e-9))
             x, y, z = map(float, np.clip(wanted, -4.0, 4.0))
             self._commands.append(Twist(Vector3(x, y, z), Vector3(0.0, 0.0, 0.0)))
         super().tick()
 
 
 def test_a_task_manager_stops_over_home_before_it_lands(bench):
-    """The way home leads past it at 4 m/s: no place to be told to land."""
+    """The path home leads past it at 4 m/s: no position for a command to land."""
     node = bench.start(TaskManager, area_m=[20.0, -10.0, 40.0, 10.0], gather_s=1.0)
     searcher = Searcher(bench)
     while node.phase is not MissionPhase.SEARCH and bench.now_ns < 60e9:
@@ -221,20 +221,20 @@ def test_the_coverage_planner_stops_at_its_last_goal_before_it_lands(bench):
     grid.info.origin.orientation.w = 1.0
     grid.data = np.zeros(4, np.int8)
     bench.send("/map", grid)
-    place, speed = np.array([1.0, 1.0, 0.1]), 0.0
+    position, speed = np.array([1.0, 1.0, 0.1]), 0.0
 
     def fly(seconds):
-        nonlocal place
+        nonlocal position
         for _ in range(round(seconds / 0.1)):
             if goals:
                 last = goals[-1].pose.position
-                place = np.array([last.x, last.y, last.z])
+                position = np.array([last.x, last.y, last.z])
             now = bench.now_ns + 100_000_000
-            bench.send("/uav1/odom", odometry(now, place, (speed, 0.0, 0.0), frame="map"))
+            bench.send("/uav1/odom", odometry(now, position, (speed, 0.0, 0.0), frame="map"))
             bench.run_to(now)
 
     fly(0.5)
-    place, speed = np.array([1.0, 1.0, 2.5]), 3.0  # it has taken off
+    position, speed = np.array([1.0, 1.0, 2.5]), 3.0  # it has taken off
     flight = node._flights[0]
     while flight.waypoints is None or flight.goal(0.3, bench.now_ns) is not None:
         fly(0.1)

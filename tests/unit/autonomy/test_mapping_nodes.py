@@ -62,8 +62,8 @@ def mapping(bench, **parameters):
     )
 
 
-def status(heard):
-    return json.loads(heard[-1].data)
+def last_status(messages):
+    return json.loads(messages[-1].data)
 
 
 # ------------------------------------------------------------------------------------ motion, rays
@@ -173,17 +173,17 @@ def test_the_room_stands_in_both_maps():
 def test_it_says_what_is_wrong():
     bench = NodeBench()
     mapping(bench)
-    told = bench.listen("/uav1/mapping/status")
+    statuses = bench.listen("/uav1/mapping/status")
     bench.run_to(S)
-    assert status(told)["problems"] == [
+    assert last_status(statuses)["problems"] == [
         "no odometry",
         "the level LIDAR is silent",
         "the nodding LIDAR is silent",
     ]
     fly(bench, 1.5, begin_ns=S)
-    assert status(told)["state"] == "mapping"
+    assert last_status(statuses)["state"] == "mapping"
     fly(bench, 3.5, lambda t: scan(t, np.full(720, np.inf)), begin_ns=3 * S)
-    assert status(told)["problems"] == [
+    assert last_status(statuses)["problems"] == [
         "the level LIDAR has no returns",
         "the nodding LIDAR has no returns",
     ]
@@ -192,14 +192,14 @@ def test_it_says_what_is_wrong():
 def test_repeated_broken_and_orphaned_scans_are_counted():
     bench = NodeBench()
     mapping(bench)
-    told = bench.listen("/uav1/mapping/status")
+    statuses = bench.listen("/uav1/mapping/status")
     one = room_scan(5 * MS)
     for message in (one, one, scan(210 * MS, np.ones(5), first=np.nan), room_scan(420 * MS)):
         bench.send("/uav1/laser/horizontal/scan", message)
-    for k in range(12):  # nobody knows where it was then
+    for k in range(12):  # without odometry of that time
         bench.send("/uav1/laser/horizontal/scan", room_scan(630 * MS + k * 210 * MS))
     bench.run_to(S)
-    counts = status(told)["scans"]["level"]
+    counts = last_status(statuses)["scans"]["level"]
     assert counts == {"dropped": 6, "repeated": 1, "unusable": 1}
 
 
@@ -233,7 +233,7 @@ def test_maps_are_saved_and_loaded_only_by_name(tmp_path):
 def test_maps_have_a_folder_of_their_own_from_the_start(tmp_path, monkeypatch):
     """Below the working folder, made with the first map; it does not grow without end."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("volery.autonomy.mapping.mapping_node._MOST_FILES", 2)
+    monkeypatch.setattr("volery.autonomy.mapping.mapping_node._MAX_FILES", 2)
     bench = NodeBench()
     node = mapping(bench)
     fly(bench, 1.0)
@@ -291,7 +291,7 @@ def test_maps_of_two_are_merged_where_tf_places_them():
     node = mapping(single)
     fly(single, 0.6)
     data = node._octree.binary()
-    merged, told = (
+    merged, statuses = (
         bench.listen("/uav1/map_merging/octomap_binary"),
         bench.listen("/uav1/map_merging/status"),
     )
@@ -301,12 +301,12 @@ def test_maps_of_two_are_merged_where_tf_places_them():
     assert merge().success
     bench.graph.deliver()
     np.testing.assert_array_equal(np.asarray(merged[-1].data).view(np.uint8), data)
-    assert "/tf holds no transform" in status(told)["left_out"]["/uav2/octomap_binary"]
+    assert "/tf holds no transform" in last_status(statuses)["left_out"]["/uav2/octomap_binary"]
     shift = Transform(Vector3(20.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
     bench.send("/tf", TFMessage([TransformStamped(header(0, "map"), "uav2/odom", shift)]))
     assert merge().success
     bench.graph.deliver()
-    assert status(told) == {"merged": 2, "reason": "", "left_out": {}}
+    assert last_status(statuses) == {"merged": 2, "reason": "", "left_out": {}}
     cubes = decode_binary(np.asarray(merged[-1].data).view(np.uint8))
     x = cubes.corner[cubes.occupied, 0] * 0.2
     assert x.min() < -3.5
@@ -314,7 +314,7 @@ def test_maps_of_two_are_merged_where_tf_places_them():
     bench.send("/uav2/octomap_binary", octomap_message(data.copy(), 0.1, "map", 0))
     merge()
     bench.graph.deliver()
-    assert "cells of 0.1 m" in status(told)["left_out"]["/uav2/octomap_binary"]
+    assert "cells of 0.1 m" in last_status(statuses)["left_out"]["/uav2/octomap_binary"]
 
 
 def test_parameters_that_are_misspelt_are_refused():

@@ -19,7 +19,7 @@ def test_obstacles_need_two_looks_and_are_forgotten():
     assert len(memory.around(np.zeros(2), 3 * S, 10.0)) == 0
 
 
-def test_a_distant_place_that_shares_the_cell_is_not_mixed_up():
+def test_a_distant_position_that_shares_the_cell_is_not_mixed_up():
     memory = ObstacleMemory(half_width_m=16.0, looks_needed=1)
     memory.add(np.array([[1.0, 1.0]]), 0)
     memory.add(np.array([[33.0, 1.0]]), 1)
@@ -40,7 +40,7 @@ def test_slope_is_found_below_trunks_and_leaves():
     assert plane.height_at(np.array([5.0, 0.0])) == pytest.approx(101.0, abs=0.3)
 
 
-def test_without_a_sonar_the_returns_tell_where_the_ground_is():
+def test_without_a_sonar_the_returns_show_where_the_ground_is():
     rng = np.random.default_rng(4)
     at = rng.uniform(-10.0, 10.0, (2000, 2))
     ground = np.column_stack([at, 0.2 * at[:, 0] + 1.0])

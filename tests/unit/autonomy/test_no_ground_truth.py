@@ -1,4 +1,4 @@
-"""Autonomy flies on what sensors tell: no module of it so much as names the truth."""
+"""Autonomy flies on sensor data alone: none of its modules so much as names the truth."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Finding a colour in a picture and placing it on the ground."""
+"""Finding a colour in an image and placing it on the ground."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def in_range(pixel, colours):
     first, last = colours.first_hue_deg, colours.last_hue_deg
     hue *= 360.0
     right = (hue >= first or hue <= last) if first > last else first <= hue <= last
-    return right and saturation >= colours.least_saturation and value >= colours.least_value
+    return right and saturation >= colours.min_saturation and value >= colours.min_value
 
 
 @pytest.mark.parametrize("colours", RANGES)
@@ -62,7 +62,7 @@ def test_the_largest_patch_counts_alone():
     blob = largest_blob(mask)
     v, u = np.argwhere(mask[9:])[:, 0] + 9, np.argwhere(mask[9:])[:, 1]
     assert blob.pixels == 21
-    assert blob.share == pytest.approx(21 / 600)
+    assert blob.fraction == pytest.approx(21 / 600)
     assert (blob.u, blob.v) == pytest.approx((u.mean(), v.mean()))
     assert largest_blob(np.zeros((5, 5), bool)) is None
 
@@ -96,23 +96,23 @@ MOUNT, MOUNT_RPY_DEG = [-0.12, 0.02, 0.01], [3.0, 85.0, -2.0]
 angle, metre = st.floats(-0.3, 0.3), st.floats(-50.0, 50.0)
 
 
-def seen_at(pose, place):
-    """Pixel of a place, step by step: map, body, mount, optical frame, pinhole."""
-    body = rotations.matrix(pose.attitude).T @ (place - pose.position)
+def seen_at(pose, position):
+    """Returns the pixel of a position, step by step: map, body, mount, optical frame, pinhole."""
+    body = rotations.matrix(pose.attitude).T @ (position - pose.position)
     roll, pitch, yaw = np.radians(MOUNT_RPY_DEG)
     ahead, left, up = rotations.matrix(rotations.from_rpy(roll, pitch, yaw)).T @ (body - MOUNT)
     return LENS.fx * -left / ahead + LENS.cx, LENS.fy * -up / ahead + LENS.cy
 
 
 @given(metre, metre, st.floats(4.0, 40.0), angle, angle, st.floats(-3.0, 3.0), angle, angle)
-def test_a_place_on_the_ground_is_found_from_its_pixel(x, y, z, roll, pitch, yaw, dx, dy):
+def test_a_position_on_the_ground_is_found_from_its_pixel(x, y, z, roll, pitch, yaw, dx, dy):
     attitude = rotations.from_rpy(roll, pitch, yaw)
     pose = OdometrySample(0, np.array([x, y, z]), attitude, np.zeros(3), np.zeros(3))
-    place = np.array([x + dx * z, y + dy * z, 0.5])
+    position = np.array([x + dx * z, y + dy * z, 0.5])
     view = GroundView(LENS, MOUNT, MOUNT_RPY_DEG)
-    u, v = seen_at(pose, place)
-    np.testing.assert_allclose(view.place_of(u, v, pose, 0.5), place, atol=1e-6)
-    disc = view.disc_of(place, 0.5, pose)
+    u, v = seen_at(pose, position)
+    np.testing.assert_allclose(view.position_of(u, v, pose, 0.5), position, atol=1e-6)
+    disc = view.disc_of(position, 0.5, pose)
     assert disc[:2] == pytest.approx((u, v), abs=1e-6)
 
 
@@ -124,7 +124,7 @@ def test_the_error_by_height_is_as_stated(off_axis, height):
     view = GroundView(LENS, [0.0, 0.0, 0.0], [0.0, 90.0, 0.0])
     part = np.array([(10.0 - height) * np.tan(off_axis), 0.0, height])
     u, v, _ = view.disc_of(part, 0.1, pose)
-    error = view.place_of(u, v, pose, 0.0)[0] - part[0]
+    error = view.position_of(u, v, pose, 0.0)[0] - part[0]
     assert error == pytest.approx(height * np.tan(off_axis), rel=1e-9)
 
 
@@ -133,14 +133,14 @@ def test_flat_rays_and_eyes_below_the_plane_find_nothing():
     level = OdometrySample(
         0, np.array([0.0, 0.0, 9.0]), np.array([0, 0, 0, 1.0]), np.zeros(3), np.zeros(3)
     )
-    assert view.place_of(160.0, 118.0, level, 0.0) is None
-    assert view.place_of(160.0, 140.0, level, 0.0) is None
-    assert view.place_of(160.0, 239.0, level, 0.0) is not None
-    assert view.place_of(160.0, 239.0, level, 9.5) is None
+    assert view.position_of(160.0, 118.0, level, 0.0) is None
+    assert view.position_of(160.0, 140.0, level, 0.0) is None
+    assert view.position_of(160.0, 239.0, level, 0.0) is not None
+    assert view.position_of(160.0, 239.0, level, 9.5) is None
     assert view.disc_of(np.array([-5.0, 0.0, 9.0]), 0.5, level) is None
 
 
-def test_a_pose_is_carried_on_to_the_picture():
+def test_a_pose_is_extrapolated_to_the_image():
     turning = OdometrySample(
         0,
         np.array([1.0, 2.0, 3.0]),

@@ -31,17 +31,17 @@ def plain_decode(data):
 
     def node(x, y, z, width):
         bits, half = next(stream) | next(stream) << 8, width // 2
-        places = [
+        corners = [
             (x + half * (c & 1), y + half * (c >> 1 & 1), z + half * (c >> 2)) for c in range(8)
         ]
         kinds = [bits >> 2 * c & 3 for c in range(8)]
-        for place, kind in zip(places, kinds, strict=True):
+        for corner, kind in zip(corners, kinds, strict=True):
             if kind in (1, 2):
                 steps = np.stack(np.meshgrid(*[np.arange(half)] * 3), -1).reshape(-1, 3)
-                found.update({tuple(cell): kind == 2 for cell in (steps + place).tolist()})
-        for place, kind in zip(places, kinds, strict=True):
+                found.update({tuple(cell): kind == 2 for cell in (steps + corner).tolist()})
+        for corner, kind in zip(corners, kinds, strict=True):
             if kind == 3:
-                node(*place, half)
+                node(*corner, half)
 
     if len(data):
         node(-32768, -32768, -32768, 65536)
@@ -69,14 +69,14 @@ def rays_to(ends, start=(0.0, 0.0, 0.0), hits=True):
 
 @pytest.fixture(scope="module")
 def room():
-    """The inside of a box of 8 m x 6 m x 3 m, seen from two places."""
+    """The inside of a box of 8 m x 6 m x 3 m, seen from two positions."""
     octree, rng = Octree(0.2), np.random.default_rng(1)
     for start in ([0.0, 0.0, 0.0], [1.5, -0.5, 0.3]):
-        way = rng.normal(size=(3000, 3))
+        directions = rng.normal(size=(3000, 3))
         with np.errstate(divide="ignore"):
-            high = (np.array([4.0, 3.0, 1.5]) - start) / way
-            low = (np.array([-4.0, -3.0, -1.5]) - start) / way
-        ends = start + way * np.maximum(high, low).min(axis=1)[:, None]
+            high = (np.array([4.0, 3.0, 1.5]) - start) / directions
+            low = (np.array([-4.0, -3.0, -1.5]) - start) / directions
+        ends = start + directions * np.maximum(high, low).min(axis=1)[:, None]
         octree.insert(rays_to(ends, start), 15.0)
     return octree
 
@@ -136,7 +136,7 @@ def test_a_stream_that_is_cut_off_is_refused(room):
 # ---------------------------------------------------------------------------------------- octree
 
 
-def test_rays_that_meet_nothing_free_the_way_up_to_the_reach():
+def test_rays_that_meet_nothing_free_the_cells_up_to_the_range():
     octree = Octree(0.2)
     octree.insert(rays_to([[10.0, 0.1, 0.1]], (0.1, 0.1, 0.1), hits=False), 10.0)
     cells = cells_of(octree.voxels())
@@ -148,13 +148,13 @@ def test_a_map_that_grows_too_large_forgets_what_is_far():
     octree, rng = Octree(0.2, max_nodes=30_000), np.random.default_rng(3)
     for k in range(40):
         start = np.array([5.0 * k, 0.0, 0.0])
-        way = rng.normal(size=(200, 3))
-        way *= 4.0 / np.linalg.norm(way, axis=1)[:, None]
-        octree.insert(rays_to(start + way, start), 15.0)
+        offsets = rng.normal(size=(200, 3))
+        offsets *= 4.0 / np.linalg.norm(offsets, axis=1)[:, None]
+        octree.insert(rays_to(start + offsets, start), 15.0)
         assert octree.nodes < 45_000
     assert octree.forgotten > 0
     corner = octree.voxels().corner[:, 0]
-    assert corner.min() * 0.2 > 50.0  # the beginning of the way is gone
+    assert corner.min() * 0.2 > 50.0  # the beginning of the path is gone
     assert corner.max() * 0.2 > 195.0
 
 
@@ -250,8 +250,8 @@ def test_a_turned_map_has_no_holes():
     back = rotations.from_rpy(0.0, 0.0, -0.5)
     for x, y, z in np.ndindex(30, 30, 4):
         cell = (x - 12, y - 6, z)
-        place = rotations.rotate(back, (np.array(cell) + 0.5) * 0.2 - turn.position) / 0.2
-        if ((place > 0.75) & (place < [11.25, 11.25, 3.25])).all():
+        position = rotations.rotate(back, (np.array(cell) + 0.5) * 0.2 - turn.position) / 0.2
+        if ((position > 0.75) & (position < [11.25, 11.25, 3.25])).all():
             assert cells[cell]
 
 

@@ -33,7 +33,7 @@ class Listening:
             self.bench.listen(f"/uav1/slam/{word}") for word in ("pose", "odom", "path", "status")
         )
 
-    def hear(self, scan, odometry=None, at_ns=None):
+    def receive(self, scan, odometry=None, at_ns=None):
         stamp = scan.header.stamp.sec * S + scan.header.stamp.nanosec
         self.bench.run_to(max(stamp if at_ns is None else at_ns, self.bench.now_ns))
         if odometry is not None:
@@ -43,7 +43,7 @@ class Listening:
     def carry(self, carried, rows=None, with_odometry=False):
         for row in range(len(carried.time_s)) if rows is None else rows:
             odometry = carried.odometry_message(row) if with_odometry else None
-            self.hear(carried.scan(row), odometry)
+            self.receive(carried.scan(row), odometry)
         return self.settle()
 
     def settle(self, seconds=2.0):
@@ -57,7 +57,7 @@ class Listening:
         return {json.loads(one.data)["state"] for one in self.status}
 
     def poses(self):
-        """(N, 4) time, x, y, yaw as they were told at the time."""
+        """(N, 4) time, x, y, yaw as they were published at the time."""
         return rows_of([(one.header, one.pose.pose) for one in self.pose])
 
     def keyframes(self):
@@ -96,29 +96,29 @@ def short(lap):
 
 @pytest.mark.parametrize("with_odometry", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_loop_of_a_hundred_metres_is_closed(lap, with_odometry):
-    heard = Listening().carry(lap, with_odometry=with_odometry)
-    assert ate(heard.keyframes(), lap) < 0.08
-    assert heard.last()["closures"] >= 3
-    assert heard.last()["sessions"] == 1
-    assert heard.states() <= {"starting", "tracking", "degraded"}
-    last = heard.poses()[-1]
+    slam = Listening().carry(lap, with_odometry=with_odometry)
+    assert ate(slam.keyframes(), lap) < 0.08
+    assert slam.last()["closures"] >= 3
+    assert slam.last()["sessions"] == 1
+    assert slam.states() <= {"starting", "tracking", "degraded"}
+    last = slam.poses()[-1]
     true = lap.poses[-1] - lap.poses[0]
     assert np.hypot(*(last[1:3] - true[:2])) < 0.25
 
 
 @pytest.mark.slow
 def test_without_closures_it_drifts_and_says_how_far_it_may_be_off(lap):
-    heard = Listening(loop_closures=False).carry(lap)
-    sigma = heard.last()["sigma_m"]
-    off = np.hypot(*(heard.poses()[-1, 1:3] - lap.poses[-1, :2]))
+    slam = Listening(loop_closures=False).carry(lap)
+    sigma = slam.last()["sigma_m"]
+    off = np.hypot(*(slam.poses()[-1, 1:3] - lap.poses[-1, :2]))
     assert off < 4.0 * sigma
     assert 0.1 < sigma < 5.0
-    assert heard.last()["closures"] == 0
+    assert slam.last()["closures"] == 0
 
 
 def plain(seed=3, speed=1.0):
     return Carried(
-        corridor(), [(0.0, 0.0), (40.0, 0.0)], reach=8.0, seed=seed, speed=speed, beams=181,
+        corridor(), [(0.0, 0.0), (40.0, 0.0)], max_range_m=8.0, seed=seed, speed=speed, beams=181,
         fov_deg=180.0,
     )  # fmt: skip
 
@@ -127,50 +127,50 @@ def plain(seed=3, speed=1.0):
 def test_a_plain_corridor_does_not_hold_it_back(seed):
     """Nothing but two walls is seen for half a minute: it goes on as it went."""
     carried = plain(seed)
-    heard = Listening().carry(carried, rows=range(0, 190))
-    x = np.interp(35.0, *heard.poses()[:, :2].T)
+    slam = Listening().carry(carried, rows=range(0, 190))
+    x = np.interp(35.0, *slam.poses()[:, :2].T)
     true = np.interp(35.0, carried.time_s, carried.poses[:, 0])
     assert true > 30.0
     assert 0.8 < x / true < 1.3
-    assert np.abs(heard.poses()[:, 2]).max() < 0.5
-    assert "scans leave one direction unconstrained" in heard.last()["problems"]
-    own = np.sqrt(heard.odom[-1].pose.covariance.reshape(6, 6).diagonal())
+    assert np.abs(slam.poses()[:, 2]).max() < 0.5
+    assert "scans leave one direction unconstrained" in slam.last()["problems"]
+    own = np.sqrt(slam.odom[-1].pose.covariance.reshape(6, 6).diagonal())
     assert own[0] > 1.0 > 5.0 * own[1]
-    sigma = np.sqrt(heard.pose[-1].pose.covariance.reshape(6, 6).diagonal())
-    assert abs(heard.poses()[-1, 1] - carried.poses[189, 0]) < 3.0 * sigma[0]
+    sigma = np.sqrt(slam.pose[-1].pose.covariance.reshape(6, 6).diagonal())
+    assert abs(slam.poses()[-1, 1] - carried.poses[189, 0]) < 3.0 * sigma[0]
 
 
-def test_in_a_plain_corridor_odometry_tells_the_way_along_it():
+def test_in_a_plain_corridor_odometry_gives_the_distance_along_it():
     carried = plain()
-    heard = Listening().carry(carried, with_odometry=True)
-    x, y = heard.poses()[-1, 1:3]
+    slam = Listening().carry(carried, with_odometry=True)
+    x, y = slam.poses()[-1, 1:3]
     assert x == pytest.approx(1.02 * carried.poses[-1, 0], rel=0.02)  # the wheels slip by that
     assert abs(y) < 0.1
-    sigma = np.sqrt(heard.pose[-1].pose.covariance.reshape(6, 6).diagonal())
+    sigma = np.sqrt(slam.pose[-1].pose.covariance.reshape(6, 6).diagonal())
     assert abs(x - carried.poses[-1, 0]) < 4.0 * sigma[0]
 
 
 def test_scans_may_be_missing(short):
     """Three in ten, and once a whole second."""
     rows = np.flatnonzero(np.random.default_rng(2).random(200) > 0.3)
-    heard = Listening().carry(short, rows=rows[(rows < 100) | (rows > 105)], with_odometry=True)
-    assert ate(heard.poses(), short) < 0.1
-    heard = Listening().carry(short, rows=rows[(rows < 100) | (rows > 105)])
-    assert ate(heard.poses(), short) < 0.2
+    slam = Listening().carry(short, rows=rows[(rows < 100) | (rows > 105)], with_odometry=True)
+    assert ate(slam.poses(), short) < 0.1
+    slam = Listening().carry(short, rows=rows[(rows < 100) | (rows > 105)])
+    assert ate(slam.poses(), short) < 0.2
 
 
 def test_another_number_of_beams_is_another_scan(short):
-    heard = Listening()
+    slam = Listening()
     for row in range(200):
         scan = short.scan(row)
         if 80 <= row < 120:
             scan = scan_message(round(short.time_s[row] * S), short.ranges[row][::2],
-                                short.angles[::2], short.reach)  # fmt: skip
+                                short.angles[::2], short.max_range_m)  # fmt: skip
         if row == 140:
-            scan = scan_message(round(short.time_s[row] * S), [], short.angles, short.reach)
-        heard.hear(scan)
-    assert ate(heard.settle().poses(), short) < 0.06
-    assert heard.last()["refused"] == 1
+            scan = scan_message(round(short.time_s[row] * S), [], short.angles, short.max_range_m)
+        slam.receive(scan)
+    assert ate(slam.settle().poses(), short) < 0.06
+    assert slam.last()["refused"] == 1
 
 
 def test_what_is_no_range_does_not_count(short):
@@ -183,76 +183,78 @@ def test_what_is_no_range_does_not_count(short):
 
 
 def test_a_clock_that_is_set_back_is_gone_along_with(short):
-    heard = Listening()
+    slam = Listening()
     for row in range(200):
         scan, odometry = short.scan(row), short.odometry_message(row)
         if row >= 100:
             back = round((short.time_s[row] - 15.0) * S)
-            scan = scan_message(back, short.ranges[row], short.angles, short.reach)
+            scan = scan_message(back, short.ranges[row], short.angles, short.max_range_m)
             odometry = odometry_message(back, short.odometry[row])
-        heard.hear(scan, odometry, at_ns=round(short.time_s[row] * S))
-    poses = heard.settle().poses()
-    assert heard.last()["clock_set"] == 1
-    assert heard.last()["sessions"] == 1
+        slam.receive(scan, odometry, at_ns=round(short.time_s[row] * S))
+    poses = slam.settle().poses()
+    assert slam.last()["clock_set"] == 1
+    assert slam.last()["sessions"] == 1
     assert np.hypot(*(poses[-1, 1:3] - short.poses[199, :2])) < 0.3
 
 
 def test_scans_that_come_twice_or_cannot_be_read_are_refused(short):
-    heard = Listening()
+    slam = Listening()
     for row in range(50):
-        heard.hear(short.scan(row))
-        heard.hear(short.scan(row))
+        slam.receive(short.scan(row))
+        slam.receive(short.scan(row))
         broken = short.scan(row)
         broken.angle_min = float("nan")
-        heard.hear(broken)
-    assert heard.settle().last()["refused"] == 100
-    assert ate(heard.poses(), short) < 0.05
+        slam.receive(broken)
+    assert slam.settle().last()["refused"] == 100
+    assert ate(slam.poses(), short) < 0.05
 
 
-def test_a_kidnapped_scanner_says_so_and_finds_its_place_again():
+def test_a_kidnapped_scanner_says_so_and_relocalizes():
     """From a room into the corridor; then it is carried back into the room unseen."""
     corners = [(3.0, 8.5), (9.0, 8.0), (8.5, 3.0), (6.5, 2.5), (6.5, 0.0), (14.0, 0.0)]
-    carried = Carried(storey(), corners, reach=8.0)
-    heard = Listening().carry(carried)
+    carried = Carried(storey(), corners, max_range_m=8.0)
+    slam = Listening().carry(carried)
     first = carried.poses[0]
     stamps = round(carried.time_s[-1] * S) + 3 * S
     for row in range(60):
         stamp = stamps + round(carried.time_s[row] * S)
-        heard.hear(scan_message(stamp, carried.ranges[row], carried.angles, carried.reach))
-    heard.settle()
-    assert heard.last()["sessions"] >= 2
-    assert "lost" in heard.states()
-    assert heard.last()["state"] in ("tracking", "degraded")
+        slam.receive(scan_message(stamp, carried.ranges[row], carried.angles, carried.max_range_m))
+    slam.settle()
+    assert slam.last()["sessions"] >= 2
+    assert "lost" in slam.states()
+    assert slam.last()["state"] in ("tracking", "degraded")
     c, s = np.cos(first[2]), np.sin(first[2])
     moved = carried.poses[59, :2] - first[:2]
     true = [c * moved[0] + s * moved[1], c * moved[1] - s * moved[0]]
-    assert np.hypot(*(heard.poses()[-1, 1:3] - true)) < 0.3
+    assert np.hypot(*(slam.poses()[-1, 1:3] - true)) < 0.3
 
 
 def test_silence_and_emptiness_are_named(short):
-    heard = Listening().carry(short, rows=range(30))
+    slam = Listening().carry(short, rows=range(30))
     blind = np.full(len(short.angles), np.inf)
     for row in range(30, 50):
-        heard.hear(scan_message(round(short.time_s[row] * S), blind, short.angles, short.reach))
-    heard.bench.run_to(heard.bench.now_ns + 700 * MS)
-    assert "too few returns in range" in heard.last()["problems"]
-    heard.settle(3.0)
-    assert "the LIDAR is silent" in heard.last()["problems"]
+        slam.receive(
+            scan_message(round(short.time_s[row] * S), blind, short.angles, short.max_range_m)
+        )
+    slam.bench.run_to(slam.bench.now_ns + 700 * MS)
+    assert "too few returns in range" in slam.last()["problems"]
+    slam.settle(3.0)
+    assert "the LIDAR is silent" in slam.last()["problems"]
 
 
 def test_a_kept_state_goes_on_as_before(short):
     one, other = Listening(), Listening()
     one.carry(short, rows=range(100), with_odometry=True)
     other.node.set_state(copy.deepcopy(one.node.get_state()))
-    told = []
-    for heard in (one, other):
-        heard.bench.run_to(one.bench.now_ns)
-        first = len(heard.pose)
+    published = []
+    for slam in (one, other):
+        slam.bench.run_to(one.bench.now_ns)
+        first = len(slam.pose)
         for row in range(100, 160):
-            heard.hear(short.scan(row), short.odometry_message(row))
-        told.append([repr(message) for message in heard.pose[first:]])
-    assert len(told[0]) == 60
-    assert told[0] == told[1]
+            slam.receive(short.scan(row), short.odometry_message(row))
+        published.append([repr(message) for message in slam.pose[first:]])
+    assert len(published[0]) == 60
+    assert published[0] == published[1]
 
 
 def test_parameters_of_the_wrong_length_are_refused():
@@ -263,19 +265,19 @@ def test_parameters_of_the_wrong_length_are_refused():
 
 
 def test_a_scanner_that_hangs_upside_down_and_aside_is_placed(short):
-    """Its beams run clockwise, from a place 0.2 m ahead, turned by 30 degrees."""
+    """Its beams run clockwise, from a mount 0.2 m ahead, turned by 30 degrees."""
     carried = copy.copy(short)
-    place = np.array([0.2, -0.1])
+    offset = np.array([0.2, -0.1])
     poses = short.poses[:60]
     from planar_bench import cast
 
     angles = np.radians(30.0) - short.angles  # roll of 180 degrees mirrors
     carried.ranges = np.array([
         cast(short.walls, [
-            pose[0] + np.cos(pose[2]) * place[0] - np.sin(pose[2]) * place[1],
-            pose[1] + np.sin(pose[2]) * place[0] + np.cos(pose[2]) * place[1], pose[2]], angles)
+            pose[0] + np.cos(pose[2]) * offset[0] - np.sin(pose[2]) * offset[1],
+            pose[1] + np.sin(pose[2]) * offset[0] + np.cos(pose[2]) * offset[1], pose[2]], angles)
         for pose in poses
     ])  # fmt: skip
-    mount = [*place.tolist(), 0.3, np.pi, 0.0, np.radians(30.0)]
-    heard = Listening(mount=mount).carry(carried, rows=range(60))
-    assert ate(heard.poses(), short) < 0.03
+    mount = [*offset.tolist(), 0.3, np.pi, 0.0, np.radians(30.0)]
+    slam = Listening(mount=mount).carry(carried, rows=range(60))
+    assert ate(slam.poses(), short) < 0.03

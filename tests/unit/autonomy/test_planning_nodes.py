@@ -39,16 +39,16 @@ TRIGGER = message_type("std_srvs/srv/Trigger_Request")
 HEIGHT = 3.0
 
 
-def told(heard):
-    return json.loads(heard[-1].data)
+def last_status(messages):
+    return json.loads(messages[-1].data)
 
 
 def pose(x, y, z=HEIGHT, frame="map"):
     return PoseStamped(header(0, frame), Pose(Point(x, y, z), LEVEL))
 
 
-def path(*places, frame="map"):
-    return PathMessage(header(0, frame), [pose(*place) for place in places])
+def path(*positions, frame="map"):
+    return PathMessage(header(0, frame), [pose(*position) for position in positions])
 
 
 # --------------------------------------------------------------------------------- local planner
@@ -91,12 +91,12 @@ class Glade:
 def test_it_plans_towards_the_path_several_times_a_second():
     glade = Glade()
     glade.go_on(1.0)
-    assert told(glade.status)["state"] == "waiting"
+    assert last_status(glade.status)["state"] == "waiting"
     assert glade.plans == []
     glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
     glade.go_on(2.0)
     assert 10 <= len(glade.plans) <= 12  # every 0.18 s
-    state = told(glade.status)
+    state = last_status(glade.status)
     assert state["state"] == "flying"
     assert state["problems"] == []
     samples = samples_of(glade.plans[-1])
@@ -107,7 +107,7 @@ def test_it_plans_towards_the_path_several_times_a_second():
     assert abs(samples.yaw) < 0.2
     glade.bench.send("/uav1/planning/path", path())
     glade.go_on(0.5)
-    assert told(glade.status)["state"] == "holding"
+    assert last_status(glade.status)["state"] == "holding"
 
 
 @pytest.mark.parametrize(
@@ -124,13 +124,13 @@ def test_without_its_senses_it_stops_and_says_why(fault, problem):
     glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
     glade.go_on(1.5)
     glade.go_on(1.5, **fault)
-    state = told(glade.status)
+    state = last_status(glade.status)
     assert state["state"] == "holding"
     assert problem in state["problems"]
     samples = samples_of(glade.plans[-1])
     assert np.hypot(*(samples.position[-1, :2] - samples.position[0, :2])) < 2.5
     glade.go_on(1.5)  # it comes back
-    assert told(glade.status)["state"] == "flying"
+    assert last_status(glade.status)["state"] == "flying"
 
 
 def test_on_the_ground_nothing_is_planned():
@@ -138,14 +138,14 @@ def test_on_the_ground_nothing_is_planned():
     glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
     glade.go_on(1.0, height=0.3)
     assert glade.plans == []
-    assert "too low above ground to plan" in told(glade.status)["problems"]
+    assert "too low above ground to plan" in last_status(glade.status)["problems"]
 
 
 @pytest.mark.parametrize("bad", [path((math.nan, 0.0)), path((1.0, 0.0), frame="uav2/odom")])
 def test_a_path_that_is_none_is_refused(bad):
     glade = Glade()
     glade.bench.send("/uav1/planning/path", bad)
-    assert told(glade.status)["state"] == "refused"
+    assert last_status(glade.status)["state"] == "refused"
     glade.go_on(0.6)
     assert glade.plans == []
 
@@ -157,11 +157,11 @@ def test_a_path_in_the_map_with_a_slash_is_flown():
     assert glade.plans
 
 
-def report(name, time_ns, place, velocity=(0.0, 0.0, 0.0)):
-    """What a teammate says over the radio."""
+def report(name, time_ns, position, velocity=(0.0, 0.0, 0.0)):
+    """Returns the report of a teammate over the radio."""
     message = zero_message("volery_interfaces/msg/TeamReport")
     message.header, message.name = header(time_ns, "map"), name
-    message.position, message.velocity = Point(*place), Vector3(*velocity)
+    message.position, message.velocity = Point(*position), Vector3(*velocity)
     return message
 
 
@@ -192,7 +192,7 @@ def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
     near.on_report(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
     (other,) = near.in_odom(frame)
     assert other.position.tolist() == [5.0, 0.0, HEIGHT]
-    assert other.time_ns == 6 * S  # by the hearer's clock
+    assert other.time_ns == 6 * S  # by the receiver's clock
     near.on_report(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
     assert near.in_odom(frame)[0].position.tolist() == [2.0, 0.0, HEIGHT]
 
@@ -219,8 +219,8 @@ def test_samples_are_the_plan():
     samples = samples_of(trajectory_message(plan, -2.5, "uav1/odom", S))
     assert samples.yaw == pytest.approx(-2.5)
     for t in np.linspace(0.0, 4.0, 41):
-        place, velocity = samples.at(S + round(t * S))
-        np.testing.assert_allclose(place, plan.at(t).position, atol=0.02)
+        position, velocity = samples.at(S + round(t * S))
+        np.testing.assert_allclose(position, plan.at(t).position, atol=0.02)
         np.testing.assert_allclose(velocity, plan.at(t).velocity, atol=0.05)
     np.testing.assert_allclose(samples.at(S // 2)[0], [-0.5, -0.25, 0.0])
 
@@ -236,7 +236,7 @@ def test_it_flies_the_plan_from_its_begin_and_rests_at_its_end():
     assert commands[-1].linear.y == pytest.approx(-1.0, abs=0.1)
     assert commands[-1].linear.x == pytest.approx(1.2 * 0.5, abs=0.05)
     assert commands[-1].angular.z == pytest.approx(-1.2)
-    assert told(status)["state"] == "flying"
+    assert last_status(status)["state"] == "flying"
     bench.send("/uav1/odom", odometry(3000 * MS, (2.0, 0.0, HEIGHT)))
     bench.run_to(3040 * MS)
     assert math.hypot(commands[-1].linear.x, commands[-1].linear.y) < 0.2
@@ -249,11 +249,11 @@ def test_it_stops_without_odometry_and_far_from_the_plan():
     bench.run_to(400 * MS)
     assert commands[-1].linear.x > 0.5
     bench.run_to(700 * MS)
-    assert told(status) == {"state": "stopped", "reason": "no odometry"}
+    assert last_status(status) == {"state": "stopped", "reason": "no odometry"}
     assert commands[-1].linear.x == commands[-1].angular.z == 0.0
     bench.send("/uav1/odom", odometry(700 * MS, (9.0, 9.0, HEIGHT)))
     bench.run_to(760 * MS)
-    assert told(status)["reason"] == "too far from the plan"
+    assert last_status(status)["reason"] == "too far from the plan"
     assert commands[-1].linear.x == 0.0
 
 
@@ -261,9 +261,9 @@ def test_plans_that_are_none_are_refused():
     bench, commands, status = follower()
     bench.send("/uav1/odom", odometry(0, (0.0, 0.0, HEIGHT)))
     bench.send("/uav1/planning/trajectory", plan_message(0, frame="uav2/odom"))
-    assert told(status)["state"] == "refused"
+    assert last_status(status)["state"] == "refused"
     bench.send("/uav1/planning/trajectory", plan_message(0, velocity=(math.nan, 0.0, 0.0)))
-    assert "not finite" in told(status)["reason"]
+    assert "not finite" in last_status(status)["reason"]
     bench.run_to(S)
     assert commands == []
 
@@ -297,13 +297,13 @@ def global_planner():
     return bench, bench.listen("/uav1/planning/path"), bench.listen("/uav1/planning/goal_status")
 
 
-def test_without_a_map_the_way_is_straight_and_with_one_it_leads_around():
+def test_without_a_map_the_path_is_straight_and_with_one_it_leads_around():
     bench, paths, status = global_planner()
     bench.send("/uav1/planning/goal", pose(8.0, 0.0))
     assert len(paths[-1].poses) == 2
-    assert told(status)["state"] == "planned"
+    assert last_status(status)["state"] == "planned"
     bench.send("/uav1/octomap_binary", ground_map(((-0.2, -8.0), (0.2, 3.0))))
-    assert len(paths) == 2  # the map showed that the way was blocked
+    assert len(paths) == 2  # the map showed that the path was blocked
     assert len(paths[-1].poses) > 2
     assert max(p.pose.position.y for p in paths[-1].poses) > 3.0
     count = len(paths)
@@ -324,8 +324,8 @@ def test_goals_that_cannot_be_are_refused_and_the_uav_stays():
     ):
         bench.send("/uav1/octomap_binary", ground_map(((3.0, -6.0), (14.0, 6.0))))
         bench.send("/uav1/planning/goal", goal)
-        assert told(status)["state"] == "refused"
-        assert reason in told(status)["reason"]
+        assert last_status(status)["state"] == "refused"
+        assert reason in last_status(status)["reason"]
         assert len(paths[-1].poses) == 0
 
 
@@ -335,9 +335,9 @@ def test_a_goal_that_is_never_reached_is_given_up():
     for k in range(60):
         bench.run_to(k * S)
         bench.send("/uav1/odom", odometry(k * S, (-8.0, 0.0, HEIGHT)))
-    assert told(status)["state"] == "unreachable"
+    assert last_status(status)["state"] == "unreachable"
     assert len(paths[-1].poses) == 0
-    assert 3 <= told(status)["plans"] <= 5
+    assert 3 <= last_status(status)["plans"] <= 5
 
 
 # -------------------------------------------------------------------------------------- exploring
@@ -363,18 +363,19 @@ def test_it_searches_until_all_is_seen():
     bench, goals, status = exploring()
     searched = bench.listen("/uav1/exploration/searched")
     bench.send("/uav1/search_area", polygon((0, 0), (40, 0), (40, 25), (0, 25)))
-    place, now = np.array([1.0, 1.0]), 0
+    position, now = np.array([1.0, 1.0]), 0
     for _ in range(400):
         now += 250 * MS
         if goals:
             goal = np.array([goals[-1].pose.position.x, goals[-1].pose.position.y])
-            way = goal - place
-            place = place + way / max(np.hypot(*way), 1e-9) * min(0.75, np.hypot(*way))
+            offset = goal - position
+            distance = np.hypot(*offset)
+            position = position + offset / max(distance, 1e-9) * min(0.75, distance)
         bench.run_to(now)
-        bench.send("/uav1/odom", odometry(now, (*place, HEIGHT)))
-        if status and told(status)["state"] == "done":
+        bench.send("/uav1/odom", odometry(now, (*position, HEIGHT)))
+        if status and last_status(status)["state"] == "done":
             break
-    state = told(status)
+    state = last_status(status)
     assert state["state"] == "done"
     assert state["covered"] > 0.97
     assert state["area_m2"] == 1000.0
@@ -386,7 +387,7 @@ def test_an_area_in_the_map_with_a_slash_is_searched():
     bench, goals, status = exploring()
     bench.send("/uav1/search_area", polygon((0, 0), (40, 0), (40, 25), frame="/map"))
     bench.run_to(S)
-    assert told(status)["state"] != "waiting"
+    assert last_status(status)["state"] != "waiting"
     assert goals
 
 
@@ -401,8 +402,8 @@ def test_areas_that_are_none_are_refused():
     ):
         bench.send("/uav1/search_area", area)
         bench.run_to(bench.now_ns + S)
-        assert told(status)["state"] == "waiting"
-        assert reason in told(status)["reason"]
+        assert last_status(status)["state"] == "waiting"
+        assert reason in last_status(status)["reason"]
     assert goals == []
 
 
@@ -412,9 +413,9 @@ def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
     for k in range(200):
         bench.run_to(k * S)
         bench.send("/uav1/odom", odometry(k * S, (1.0, 1.0, HEIGHT)))
-        if status and told(status)["state"] == "blocked":
+        if status and last_status(status)["state"] == "blocked":
             break
-    state = told(status)
+    state = last_status(status)
     assert state["state"] == "blocked"
     assert state["given_up"] >= 1
     assert "cannot be reached" in state["reason"]
@@ -424,8 +425,8 @@ def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
     "node_class", [LocalPlanner, GlobalPlanner, Exploration, TrajectoryFollower]
 )
 def test_states_go_back(node_class):
-    """A twin that takes over a state says from then on what the first one says."""
-    said = []
+    """A twin that takes over a state publishes from then on what the first one publishes."""
+    published = []
     first, second = NodeBench(), NodeBench()
     node, twin = (bench.start(node_class, odometry="odom") for bench in (first, second))
     grid = grid_values_message(np.zeros((50, 50), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
@@ -441,13 +442,13 @@ def test_states_go_back(node_class):
         first.send(f"/uav1/{topic}", message)
     twin.set_state(copy.deepcopy(node.get_state()))
     for bench in (first, second):
-        heard = []
-        bench.graph.subscribe_all(lambda p, heard=heard: heard.append((p.topic, p.cdr)))
+        received = []
+        bench.graph.subscribe_all(lambda p, received=received: received.append((p.topic, p.cdr)))
         bench.graph.deliver()
-        heard.clear()  # what was latched before
+        received.clear()  # what was latched before
         for k in range(1, 80):
             bench.run_to(k * 100 * MS)
             bench.send("/uav1/odom", odometry(bench.now_ns, (1.0 + 0.01 * k, 2.0, HEIGHT)))
-        said.append([each for each in heard if each[0] != "/uav1/odom"])
-    assert said[0] == said[1]
-    assert len(said[0]) > 1
+        published.append([each for each in received if each[0] != "/uav1/odom"])
+    assert published[0] == published[1]
+    assert len(published[0]) > 1

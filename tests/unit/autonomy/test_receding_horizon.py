@@ -45,10 +45,11 @@ def everywhere(x, y):
     return ~nothing(x, y)
 
 
-def trunks_at(places, radius):
+def trunks_at(positions, radius):
     """Round trunks (K, 2) as a world."""
     return lambda x, y: (
-        np.hypot(x[..., None] - places[:, 0], y[..., None] - places[:, 1]).min(axis=-1) < radius
+        np.hypot(x[..., None] - positions[:, 0], y[..., None] - positions[:, 1]).min(axis=-1)
+        < radius
     )
 
 
@@ -71,7 +72,7 @@ def sight(*world, planes=()):
 
 
 @given(vectors, vectors, vectors, st.floats(0.3, 3.0))
-def test_a_change_of_velocity_begins_and_ends_as_told(velocity, acceleration, wanted, seconds):
+def test_a_change_of_velocity_begins_and_ends_as_given(velocity, acceleration, wanted, seconds):
     start = PrimitiveState(np.zeros(3), velocity, acceleration)
     first, last = changed(start, wanted, seconds, 0.0), changed(start, wanted, seconds, seconds)
     np.testing.assert_allclose(first.velocity, velocity, atol=1e-9)
@@ -182,7 +183,7 @@ def test_rays_visit_the_cells_of_fine_sampling(end, start, dx, dy):
 # --------------------------------------------------------------------------------------- guidance
 
 
-def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
+def test_the_guidance_goes_around_a_wall_and_knows_what_is_unreachable():
     wall = lambda x, y: (abs(x - 3.0) < 0.3) & (y > -5.0)  # noqa: E731
     costs = cost_to_go(
         sight(wall).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), CellCosts(0.6, 1.6)
@@ -216,11 +217,11 @@ def test_candidates_are_judged_as_plain_sampling_would():
         path = candidates.path(k)
         times = np.minimum(np.arange(0.0, path.duration_s + 0.08, 0.08), path.duration_s)
         states = [path.at(t) for t in times]
-        places = np.array([s.position for s in states])
-        assert verdicts.nearest_m[k] == pytest.approx(seen.clearance.at(places).min(), abs=1e-9)
-        assert verdicts.unknown[k] == (places[:, 0] >= 5.0).any()
-        most = max(np.hypot(*s.acceleration[:2]) for s in states)
-        assert verdicts.most_m_s2[k] == pytest.approx(most, abs=1e-9)
+        positions = np.array([s.position for s in states])
+        assert verdicts.nearest_m[k] == pytest.approx(seen.clearance.at(positions).min(), abs=1e-9)
+        assert verdicts.unknown[k] == (positions[:, 0] >= 5.0).any()
+        max_acceleration = max(np.hypot(*s.acceleration[:2]) for s in states)
+        assert verdicts.max_acceleration_m_s2[k] == pytest.approx(max_acceleration, abs=1e-9)
 
 
 # ------------------------------------------------------------------------------- plan after plan
@@ -245,10 +246,10 @@ def test_it_flies_between_trunks_at_speed():
     trunks = np.array([(3.0, 0.2), (4.5, -2.2), (6.0, 1.5), (3.5, 2.6)])
     world = (trunks_at(trunks, 0.2),)
     _, track = fly(world, (8.0, 0.0), 6.0)
-    places = np.array([s.position for s in track])
-    nearest = min(np.hypot(*(places[:, :2] - t).T).min() for t in trunks)
+    positions = np.array([s.position for s in track])
+    nearest = min(np.hypot(*(positions[:, :2] - t).T).min() for t in trunks)
     assert nearest > 0.2 + 0.5
-    assert places[-1, 0] > 6.0
+    assert positions[-1, 0] > 6.0
     assert max(np.linalg.norm(s.velocity) for s in track) > 2.0
     bends = [np.hypot(*s.acceleration[:2]) for s in track]
     assert max(bends) <= 1.25 * LIMITS.acceleration + 1e-6
@@ -276,10 +277,10 @@ def test_whenever_plans_cease_it_comes_to_rest_in_known_free_space(seed):
     planning, _ = fly(world, goal, rng.uniform(0.4, 3.0))
     seen = sight(*world).clearance
     times = planning.began_ns + (np.arange(0.0, 8.0, 0.05) * 1e9).astype(np.int64)
-    places = np.array([planning.state_at(int(t)).position for t in times])
-    least = PlannerSettings(LIMITS).radius_m
-    assert seen.at(places).min() >= min(least, float(seen.at(places[:1])[0]))
-    assert (np.hypot(*places[:, :2].T) < hidden + CELL).all()
+    positions = np.array([planning.state_at(int(t)).position for t in times])
+    radius_m = PlannerSettings(LIMITS).radius_m
+    assert seen.at(positions).min() >= min(radius_m, float(seen.at(positions[:1])[0]))
+    assert (np.hypot(*positions[:, :2].T) < hidden + CELL).all()
     np.testing.assert_allclose(planning.state_at(int(times[-1])).velocity, 0.0, atol=1e-6)
 
 
@@ -318,17 +319,17 @@ def test_state_goes_back():
         np.testing.assert_array_equal(a, b)
 
 
-def test_the_lookahead_point_goes_ahead_along_the_way_and_not_back():
-    way = PathLookahead(np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10, 0]]))
+def test_the_lookahead_point_goes_ahead_along_the_path_and_not_back():
+    lookahead = PathLookahead(np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10, 0]]))
     np.testing.assert_allclose(
-        way.lookahead_point(np.array([2.0, 1.0]), 9.0), [10.0, 1.0], atol=0.3
+        lookahead.lookahead_point(np.array([2.0, 1.0]), 9.0), [10.0, 1.0], atol=0.3
     )
-    assert way.left_m(np.array([2.0, 0.0])) == pytest.approx(18.0, abs=0.3)
-    way.lookahead_point(np.array([9.0, 6.0]), 3.0)
+    assert lookahead.left_m(np.array([2.0, 0.0])) == pytest.approx(18.0, abs=0.3)
+    lookahead.lookahead_point(np.array([9.0, 6.0]), 3.0)
     np.testing.assert_allclose(
-        way.lookahead_point(np.array([9.0, 6.0]), 9.0), [10.0, 10.0], atol=0.3
+        lookahead.lookahead_point(np.array([9.0, 6.0]), 9.0), [10.0, 10.0], atol=0.3
     )
-    np.testing.assert_allclose(way.lookahead_point(np.array([2.0, 0.0]), 0.0)[0], 10.0)
+    np.testing.assert_allclose(lookahead.lookahead_point(np.array([2.0, 0.0]), 0.0)[0], 10.0)
     one = PathLookahead(np.array([[3.0, 4.0, 0.0]]))
     np.testing.assert_allclose(one.lookahead_point(np.zeros(2), 9.0), [3.0, 4.0])
     assert one.left_m(np.zeros(2)) == pytest.approx(5.0)

@@ -24,7 +24,7 @@ def at(x, y, vx=0.0, vy=0.0, z=0.0, time_ns=0):
 
 
 def avoiding_velocity(planes, preferred, top_speed):
-    """Returns the allowed velocity (2,) nearest to the preferred one; else the least violation.
+    """Returns the allowed velocity (2,) nearest to the preferred one; else the smallest violation.
 
     With few constraints the optimum lies at the preferred velocity, at its projection on one of the
     lines or on the circle of `top_speed`, or at an intersection of two of them: all are tried. If
@@ -65,29 +65,35 @@ def _on_circle(plane, radius):
     return [plane.point + along * (-half + sign * math.sqrt(root)) for sign in (-1.0, 1.0)]
 
 
-def step(places, velocities, goals, seconds=0.2, speed=2.0):
+def step(positions, velocities, goals, seconds=0.2, speed=2.0):
     """All avoid each other at once."""
     chosen = []
-    for k, (place, velocity) in enumerate(zip(places, velocities, strict=True)):
-        others = [at(*places[j], *velocities[j]) for j in range(len(places)) if j != k]
-        planes = half_planes(np.append(place, 0.0), np.append(velocity, 0.0), others, SEPARATION, 0)
-        way = goals[k] - place
-        length = np.hypot(*way)
-        wanted = way / max(length, 1e-9) * min(speed, length / 0.5)
+    for k, (position, velocity) in enumerate(zip(positions, velocities, strict=True)):
+        others = [at(*positions[j], *velocities[j]) for j in range(len(positions)) if j != k]
+        planes = half_planes(
+            np.append(position, 0.0), np.append(velocity, 0.0), others, SEPARATION, 0
+        )
+        offset = goals[k] - position
+        length = np.hypot(*offset)
+        wanted = offset / max(length, 1e-9) * min(speed, length / 0.5)
         if violation(planes, wanted[None])[0] > 0.0:  # keep right, lest all come to a stand
             wanted = np.array([[c, s], [-s, c]]) @ wanted
         chosen.append(avoiding_velocity(planes, wanted, speed))
     velocities = np.array(chosen)
-    return places + seconds * velocities, velocities
+    return positions + seconds * velocities, velocities
 
 
-def fly(places, goals, steps=200):
-    places, velocities, nearest = np.array(places, float), np.zeros((len(places), 2)), math.inf
+def fly(positions, goals, steps=200):
+    positions, velocities, nearest = (
+        np.array(positions, float),
+        np.zeros((len(positions), 2)),
+        math.inf,
+    )
     for _ in range(steps):
-        places, velocities = step(places, velocities, np.array(goals, float))
-        apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-        nearest = min(nearest, apart[~np.eye(len(places), dtype=bool)].min())
-    return nearest, np.hypot(*(places - goals).T).max()
+        positions, velocities = step(positions, velocities, np.array(goals, float))
+        apart = np.hypot(*(positions[:, None] - positions[None]).transpose(2, 0, 1))
+        nearest = min(nearest, apart[~np.eye(len(positions), dtype=bool)].min())
+    return nearest, np.hypot(*(positions - goals).T).max()
 
 
 def test_two_that_meet_pass_each_other():
@@ -98,8 +104,8 @@ def test_two_that_meet_pass_each_other():
 
 def test_six_on_a_circle_change_sides():
     angle = np.arange(6) * math.pi / 3 + np.array([0.01, -0.02, 0.03, 0.0, 0.02, -0.01])
-    places = 10.0 * np.stack([np.cos(angle), np.sin(angle)], -1)
-    nearest, left = fly(places, -places, 90)
+    positions = 10.0 * np.stack([np.cos(angle), np.sin(angle)], -1)
+    nearest, left = fly(positions, -positions, 90)
     assert nearest > 1.9
     assert left < 0.5
 
@@ -133,7 +139,7 @@ def test_others_that_are_far_old_high_or_broken_do_not_matter():
     assert violation([plane], own[None, :2])[0] == 0.0
 
 
-def test_what_was_heard_long_ago_is_carried_on_and_wider():
+def test_an_old_report_is_extrapolated_and_widened():
     own = np.array([1.0, 0.0, 0.0])
     old = at(10.0, 0.0, -1.0, time_ns=-2 * S)
     carried = at(8.0, 0.0, -1.0)

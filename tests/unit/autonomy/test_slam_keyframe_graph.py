@@ -1,4 +1,4 @@
-"""The SLAM's way: when keyframes are due, and which old ones are tried by one that is lost."""
+"""The SLAM's keyframe graph: when keyframes are due, and which ones relocalization tries."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Closer:
     """Finds nothing, and notes what it was asked."""
 
     def __init__(self):
-        self.asked, self.reaches = [], []
+        self.asked, self.extents = [], []
 
-    def find(self, _frames, _poses, _newest, older, reach):
+    def find(self, _frames, _poses, _newest, older, extent):
         self.asked.append(older)
-        self.reaches.append(reach)
+        self.extents.append(extent)
 
 
 class Guesser:
@@ -34,7 +34,7 @@ class Guesser:
     def __init__(self, steps, margin=0.06):
         self.steps, self.margin = steps, margin
 
-    def find(self, _frames, _poses, newest, older, _reach):
+    def find(self, _frames, _poses, newest, older, _extent):
         if older not in self.steps:
             return None
         edge = PoseGraphEdge(older, newest, np.array(self.steps[older]), np.ones(4), True)
@@ -47,51 +47,53 @@ def keyframe(number, session=0):
 
 
 def flown(count):
-    """A way of so many keyframes, and what finds places in it again."""
-    way = KeyframeGraph(ScanMatching(), np.zeros(4), has_loops=False)
-    way.frames = [keyframe(k) for k in range(count)]
-    way.poses = [np.zeros(4) for _ in range(count)]
-    way._closer = Closer()
-    return way, way._closer
+    """Returns a graph of so many keyframes, and what finds loop closures in it."""
+    graph = KeyframeGraph(ScanMatching(), np.zeros(4), has_loops=False)
+    graph.frames = [keyframe(k) for k in range(count)]
+    graph.poses = [np.zeros(4) for _ in range(count)]
+    graph._closer = Closer()
+    return graph, graph._closer
 
 
-def find(way, count):
+def find(graph, count):
     """What so many rounds of looking find."""
-    edges = [way.relocation.find(way._closer, way.frames, way.poses) for _ in range(count)]
+    edges = [
+        graph.relocalization.find(graph._closer, graph.frames, graph.poses) for _ in range(count)
+    ]
     return [edge for edge in edges if edge is not None]
 
 
 def lost_after(count, **how):
-    """A way that was lost after so many keyframes, 7 m apart, and has three since."""
-    way, closer = flown(count)
-    way.poses = [np.array([7.0 * k, 0.0, 0.0, 0.0]) for k in range(count)]
-    way.restart(**how)
-    way.frames += [keyframe(count + k, session=1) for k in range(3)]
-    way.poses += [np.zeros(4) for _ in range(3)]
-    return way, closer
+    """Returns a graph that was lost after so many keyframes, 7 m apart, and has three since."""
+    graph, closer = flown(count)
+    graph.poses = [np.array([7.0 * k, 0.0, 0.0, 0.0]) for k in range(count)]
+    graph.restart(**how)
+    graph.frames += [keyframe(count + k, session=1) for k in range(3)]
+    graph.poses += [np.zeros(4) for _ in range(3)]
+    return graph, closer
 
 
 def test_one_that_is_lost_tries_all_it_knows_the_latest_first():
-    way, closer = lost_after(9)
-    assert not find(way, 9)
+    graph, closer = lost_after(9)
+    assert not find(graph, 9)
     assert closer.asked[:9] == [8, 5, 2, 7, 4, 1, 6, 3, 0]
     assert {row: closer.asked.count(row) for row in range(9)} == dict.fromkeys(range(9), 6)
-    headings = [radians for _, radians in closer.reaches]
-    assert headings == [0.2] * 9 + [np.pi] * 45  # as the gyroscope tells, then any
+    headings = [radians for _, radians in closer.extents]
+    assert headings == [0.2] * 9 + [np.pi] * 45  # around the heading of the gyroscope, then any
 
 
 def test_keyframes_since_it_may_have_been_elsewhere_are_not_tried():
-    way, closer = lost_after(9, doubted_since_ns=6 * S)
-    assert not find(way, 7)
+    graph, closer = lost_after(9, doubted_since_ns=6 * S)
+    assert not find(graph, 7)
     assert set(closer.asked) == set(range(7))
 
 
 def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
-    way, closer = lost_after(9)
-    way.restart()
-    way.frames += [keyframe(12 + k, session=2) for k in range(3)]
-    way.poses += [np.zeros(4) for _ in range(3)]
-    assert not find(way, 9)
+    graph, closer = lost_after(9)
+    graph.restart()
+    graph.frames += [keyframe(12 + k, session=2) for k in range(3)]
+    graph.poses += [np.zeros(4) for _ in range(3)]
+    assert not find(graph, 9)
     assert set(closer.asked) == set(range(9))
 
 
@@ -132,23 +134,23 @@ def test_a_hint_makes_a_weak_guess_sure(hint, is_found):
 
 
 def test_a_find_is_of_the_newest_keyframe():
-    way, _ = lost_after(24)
-    way._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, margin=0.25)
-    found = find(way, 6)
+    graph, _ = lost_after(24)
+    graph._closer = Guesser({11: [1.0, 0.0, 0.0, 0.0]}, margin=0.25)
+    found = find(graph, 6)
     assert found
     assert {(edge.origin, edge.to) for edge in found} == {(11, 26)}
 
 
 def test_one_that_is_lost_and_holds_still_looks_around_more_often():
-    way, _ = flown(2)
+    graph, _ = flown(2)
     tracker = Tracker(np.zeros(3))
     due = {}
     for lost in (False, True):
-        way.is_placed = not lost
+        graph.is_placed = not lost
         times = [k * S // 2 for k in range(2, 30)]
         for time_ns in times:
             tracker._imu = (S + time_ns, np.zeros(3), np.zeros(3))
-            if way._is_due(tracker):
+            if graph._is_due(tracker):
                 due[lost] = time_ns / S
                 break
     assert due == {False: 10.5, True: 2.5}

@@ -154,14 +154,14 @@ def started(**parameters):
 
 @pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "mono8"])
 def test_the_node_publishes_detections(shots, encoding):
-    bench, _, heard = started(publish_tf=True)
+    bench, _, received = started(publish_tf=True)
     frames = bench.listen("/tf")
     shot = shots[2.0]
     bench.send("/uav1/camera/image_raw", shot.message(encoding))
-    assert not heard  # without intrinsics
+    assert not received  # without intrinsics
     bench.send("/uav1/camera/camera_info", info())
     bench.send("/uav1/camera/image_raw", shot.message(encoding))
-    (array,) = heard
+    (array,) = received
     assert array.header.frame_id == "uav1/camera_optical"
     assert array.header.stamp.nanosec == 9
     (one,) = array.detections
@@ -178,10 +178,10 @@ def test_the_node_publishes_detections(shots, encoding):
 
 def test_the_node_leaves_out_what_parameters_exclude(shots):
     for parameters in ({"ids": [3]}, {"min_side_px": 400.0}, {"max_error_px": 0.01}):
-        bench, _, heard = started(**parameters)
+        bench, _, received = started(**parameters)
         bench.send("/uav1/camera/camera_info", info())
         bench.send("/uav1/camera/image_raw", shots[2.0].message())
-        assert [len(array.detections) for array in heard] == [0]
+        assert [len(array.detections) for array in received] == [0]
 
 
 def test_parameters_have_bounds():
@@ -209,10 +209,10 @@ def test_images_and_intrinsics_that_do_not_fit_are_errors(shots):
 def test_a_snapshot_holds_the_intrinsics(shots):
     bench, node, _ = started()
     bench.send("/uav1/camera/camera_info", info())
-    other_bench, other, heard = started()
+    other_bench, other, received = started()
     other.set_state(node.get_state())
     other_bench.send("/uav1/camera/image_raw", shots[2.0].message())
-    assert len(heard[0].detections) == 1
+    assert len(received[0].detections) == 1
 
 
 def test_classes_of_other_families_are_none():

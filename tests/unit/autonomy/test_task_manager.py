@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from team_bench import AREA, TeamBench
 
-from volery.autonomy.perception.map_frame import UNKNOWN_PLACE
+from volery.autonomy.perception.map_frame import UNKNOWN_POSE
 from volery.autonomy.search.search_positions import Area
 from volery.autonomy.team.assignment import SectorClaim, Worker, assign, must_yield
 from volery.autonomy.team.mission_messages import goal_at
@@ -47,7 +47,7 @@ def test_sectors_tile_the_area() -> None:
 def test_coverage_is_what_was_in_sight() -> None:
     coverage = Coverage(Area(0.0, 0.0, 20.0, 20.0), 0.5)
     new = coverage.look(np.array([10.0, 10.0]), 6.0)
-    assert coverage.share == pytest.approx(np.pi * 36.0 / 400.0, rel=0.02)
+    assert coverage.covered_fraction == pytest.approx(np.pi * 36.0 / 400.0, rel=0.02)
     assert new == coverage.seen.sum()
     assert coverage.look(np.array([10.0, 10.0]), 6.0) == 0
     assert coverage.look(np.array([80.0, 10.0]), 6.0) == 0
@@ -65,9 +65,9 @@ def test_flags_come_back_from_a_report(flags: list[bool]) -> None:
     st.sets(st.integers(0, 11)),
     st.lists(st.tuples(st.floats(0, 80), st.floats(0, 60)), min_size=6, max_size=6),
 )
-def test_each_gets_one_sector_of_its_own(count: int, done: set[int], places: Any) -> None:
+def test_each_gets_one_sector_of_its_own(count: int, done: set[int], positions: Any) -> None:
     searched = np.isin(np.arange(12), list(done))
-    workers = {f"uav{k + 1}": worker(*places[k]) for k in range(count)}
+    workers = {f"uav{k + 1}": worker(*positions[k]) for k in range(count)}
     centres = Sectors(Area(*AREA), 20.0).centres()
     chosen = assign(workers, searched, centres)
     assert len(set(chosen.values())) == len(chosen) == min(count, 12 - len(done))
@@ -103,22 +103,22 @@ def test_finds_of_one_thing_are_one_target() -> None:
     assert found.take([find("uav1", 1, 10.0), find("uav2", 1, 12.0, 2), find("uav2", 2, 40.0)])
     assert not found.take([find("uav1", 1, 99.0, 0)])  # an old one
     first, second = found.targets()
-    assert first.place[0] == pytest.approx(11.0)
+    assert first.position[0] == pytest.approx(11.0)
     assert first.covariance[0] == pytest.approx(0.505)
     assert (first.finder, first.sightings, first.stamp_ns) == ("uav1", 10, 2)
-    assert second.place[0] == 40.0
-    told = [Detection.from_message(message) for message in found.changed(0)]
-    assert sorted(told) == sorted(found.finds.values())
+    assert second.position[0] == 40.0
+    changed = [Detection.from_message(message) for message in found.changed(0)]
+    assert sorted(changed) == sorted(found.detections.values())
 
 
-def test_many_finds_are_told_in_turns_and_broken_ones_not_at_all() -> None:
+def test_many_finds_are_published_in_turns_and_broken_ones_not_at_all() -> None:
     found = TargetList(4.0)
     found.take(find("uav1", k, 10.0 * k, stamp=100 - k) for k in range(7))
     turns = [[message.number for message in found.changed(turn)] for turn in range(4)]
     assert turns == [[0, 1, 2, 3], [0, 1, 4, 5], [0, 1, 6, 2], [0, 1, 3, 4]]
     broken = find("uav2", 1, math.nan), find("uav2", 2, 5.0, variance=-1.0)
     assert not found.take(broken)
-    assert len(found.finds) == 7
+    assert len(found.detections) == 7
 
 
 # ------------------------------------------------------------------------------------- the team
@@ -133,7 +133,7 @@ def test_three_search_everything_and_come_home() -> None:
     assert set(bench.phases().values()) == {"done"}
     for name, manager in bench.managers.items():
         assert manager.member.searched.all()
-        np.testing.assert_allclose(bench.uavs[name].place[:2], HOMES[name], atol=2.0)
+        np.testing.assert_allclose(bench.uavs[name].position[:2], HOMES[name], atol=2.0)
 
 
 def test_three_are_faster_than_one() -> None:
@@ -160,7 +160,7 @@ def test_the_rest_of_a_lost_uav_is_taken_over() -> None:
     left = bench.managers["uav2"].member.sector
     assert left >= 0
     bench.uavs["uav2"].stuck = True
-    bench.hears = lambda one, other: "uav2" not in (one, other)
+    bench.is_connected = lambda one, other: "uav2" not in (one, other)
     bench.run(140.0)
     for name in ("uav1", "uav3"):
         assert bench.managers[name].member.searched[left]
@@ -194,13 +194,13 @@ def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
     uav, manager = bench.uavs["uav2"], bench.managers["uav2"]
-    left, place = manager.member.sector, uav.place.copy()
+    left, position = manager.member.sector, uav.position.copy()
     assert bench.order("uav2", "hold") == "holds until resume, return or land"
     bench.run(30.0)
     assert uav.asked[-1] == "hold"
     assert (str(manager.phase), manager.member.sector) == ("hold", -1)
     assert manager.problem == "held by the operator"
-    np.testing.assert_allclose(uav.place, place, atol=1.0)
+    np.testing.assert_allclose(uav.position, position, atol=1.0)
     assert {bench.managers[n].member.sector for n in ("uav1", "uav3")} & {
         left
     } or manager.member.searched[left]
@@ -215,20 +215,20 @@ def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
 def test_one_that_is_held_in_its_climb_climbs_on_before_it_searches() -> None:
     bench = TeamBench({"uav1": HOMES["uav1"]})
     uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
-    uav.reaches_m = 0.5  # too low for planners
+    uav.climb_limit_m = 0.5  # too low for planners
     while not uav.flies:
         bench.run(0.1)
     assert manager.phase == "rise"
     bench.order("uav1", "hold")
     bench.run(5.0)
-    assert (str(manager.phase), uav.place[2]) == ("hold", 0.5)
+    assert (str(manager.phase), uav.position[2]) == ("hold", 0.5)
     assert bench.order("uav1", "resume") == "searches"
     bench.run(1.0)
     assert (str(manager.phase), manager.member.sector) == ("rise", -1)
-    assert 1.0 < uav.place[2] < 2.0
+    assert 1.0 < uav.position[2] < 2.0
     bench.run(3.0)
     assert manager.phase == "search"
-    assert 2.4 < uav.place[2] < 3.1
+    assert 2.4 < uav.position[2] < 3.1
     assert uav.asked == ["take_off_to", "hold", "hold"]
 
 
@@ -238,17 +238,17 @@ def test_one_that_goes_on_near_the_ground_climbs_first(ground_m: float, climbs: 
     bench.run(10.0)
     uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
     bench.order("uav1", "hold")
-    uav.place[2] = 0.8
+    uav.position[2] = 0.8
     bench.run(1.0)
     uav.measure(0.8 - ground_m)
     bench.run(0.3)
     bench.order("uav1", "resume")
     bench.run(4.0)
     assert manager.phase == "search"
-    assert (2.4 < uav.place[2] < 3.1) if climbs else uav.place[2] == 0.8
+    assert (2.4 < uav.position[2] < 3.1) if climbs else uav.position[2] == 0.8
 
 
-def test_what_a_sonar_said_long_ago_has_nobody_climb() -> None:
+def test_what_a_sonar_measured_long_ago_makes_no_uav_climb() -> None:
     bench = TeamBench({"uav1": HOMES["uav1"]})
     bench.run(10.0)
     uav = bench.uavs["uav1"]
@@ -257,7 +257,7 @@ def test_what_a_sonar_said_long_ago_has_nobody_climb() -> None:
     bench.run(2.0)
     bench.order("uav1", "resume")
     bench.run(4.0)
-    assert uav.place[2] == 3.0
+    assert uav.position[2] == 3.0
 
 
 def test_one_that_is_landed_gives_its_sector_up_and_may_go_on() -> None:
@@ -310,8 +310,8 @@ def test_one_that_is_held_goes_home_by_order_or_with_a_low_battery() -> None:
     assert bench.phases()["uav1"] == "search"
 
 
-def test_one_that_somebody_landed_says_so_and_gives_its_sector_up() -> None:
-    """By the sonar: nobody told its mission."""
+def test_one_that_was_landed_externally_says_so_and_gives_its_sector_up() -> None:
+    """Its sonar shows that: its mission did not land it."""
     bench = TeamBench(HOMES)
     sonar = bench.graph.advertise("/uav3/range", "sensor_msgs/msg/Range")
     bench.run(10.0)
@@ -330,7 +330,7 @@ def test_one_that_somebody_landed_says_so_and_gives_its_sector_up() -> None:
     assert bench.managers["uav1"].member.searched[left]
 
 
-def test_a_goal_of_the_explorer_that_comes_late_keeps_nobody_from_home() -> None:
+def test_a_goal_of_the_explorer_that_comes_late_keeps_no_uav_from_home() -> None:
     bench = TeamBench({"uav1": HOMES["uav1"]})
     bench.run(15.0)
     bench.uavs["uav1"].charge = 0.2
@@ -340,17 +340,17 @@ def test_a_goal_of_the_explorer_that_comes_late_keeps_nobody_from_home() -> None
     bench.graph.advertise("/uav1/planning/goal", type(late)).publish(late)
     bench.run(45.0)  # by far less than it takes to give up
     assert bench.managers["uav1"].phase == "done"
-    np.testing.assert_allclose(bench.uavs["uav1"].place[:2], HOMES["uav1"], atol=2.0)
+    np.testing.assert_allclose(bench.uavs["uav1"].position[:2], HOMES["uav1"], atol=2.0)
 
 
 def test_a_network_that_falls_apart_and_comes_together() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
-    bench.hears = lambda _one, _other: False
+    bench.is_connected = lambda _one, _other: False
     bench.run(40.0)
     alone = [manager.member.searched.copy() for manager in bench.managers.values()]
     assert not np.array_equal(alone[0], alone[2])
-    bench.hears = lambda _one, _other: True
+    bench.is_connected = lambda _one, _other: True
     bench.run(1.0)
     together = [manager.member.searched.tolist() for manager in bench.managers.values()]
     assert together[0] == together[1] == together[2]
@@ -380,7 +380,7 @@ def test_a_target_is_on_every_list_within_a_second() -> None:
     bench.run(1.0)
     for manager in bench.managers.values():
         (found,) = manager.member.targets.targets()
-        assert (found.finder, found.place[0]) == ("uav2", 33.0)
+        assert (found.finder, found.position[0]) == ("uav2", 33.0)
 
 
 def test_it_holds_while_it_does_not_know_where_it_is() -> None:
@@ -394,10 +394,10 @@ def test_it_holds_while_it_does_not_know_where_it_is() -> None:
     assert bench.managers["uav1"].problem == ""
 
 
-def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> None:
+def test_it_waits_and_in_the_end_lands_where_its_position_in_the_map_is_lost() -> None:
     bench = TeamBench({})
     bench.add("uav1", (10.0, 0.0), use_map_tf=True)
-    tf, told = (
+    tf, publisher = (
         zero_message("geometry_msgs/msg/TransformStamped"),
         bench.graph.advertise("/tf", TFMessage),
     )
@@ -409,13 +409,13 @@ def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> N
         for _ in range(round(2.0 * seconds)):
             if placed:
                 tf.header = header(bench.clock.now_ns, "map")
-                told.publish(TFMessage([tf]))
+                publisher.publish(TFMessage([tf]))
             bench.run(0.5)
 
     run(10.0, True)
     assert manager.problem == ""
     run(4.0, False)
-    assert manager.problem == UNKNOWN_PLACE
+    assert manager.problem == UNKNOWN_POSE
     assert uav.flies
     run(2.0, True)
     assert manager.problem == ""
@@ -432,9 +432,9 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
     )
     for name, manager in bench.managers.items():
         other.managers[name].set_state(copy.deepcopy(manager.get_state()))
-        other.uavs[name].place = bench.uavs[name].place.copy()
-        other.uavs[name].way = list(bench.uavs[name].way)
-    other.hears = bench.hears = lambda _one, _other: False
+        other.uavs[name].position = bench.uavs[name].position.copy()
+        other.uavs[name].waypoints = list(bench.uavs[name].waypoints)
+    other.is_connected = bench.is_connected = lambda _one, _other: False
     bench.run(20.0)
     other.run(20.0)
     for name, manager in bench.managers.items():
@@ -442,7 +442,7 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
         assert manager.member.searched.tolist() == other.managers[name].member.searched.tolist()
 
 
-def test_who_has_nothing_to_search_waits_and_takes_over() -> None:
+def test_a_uav_without_a_sector_waits_and_takes_over() -> None:
     """One sector for two: the other one hovers, until the first one fails."""
     bench = TeamBench({})
     for name, home in (("uav1", (30.0, 30.0)), ("uav2", (0.0, 0.0))):
@@ -452,11 +452,11 @@ def test_who_has_nothing_to_search_waits_and_takes_over() -> None:
     bench.uavs["uav1"].charge = 0.1
     bench.run(2.0)
     assert bench.phases() == {"uav1": "return", "uav2": "search"}
-    assert bench.uavs["uav2"].way
-    bench.managers["uav2"].member.searched[0] = True  # as if it had heard so
+    assert bench.uavs["uav2"].waypoints
+    bench.managers["uav2"].member.searched[0] = True  # as if a report had said so
     bench.run(0.5)
     assert bench.phases()["uav2"] == "return"
-    assert len(bench.uavs["uav2"].way) == 1
+    assert len(bench.uavs["uav2"].waypoints) == 1
 
 
 def test_an_explorer_says_when_it_is_through() -> None:
@@ -488,8 +488,8 @@ def test_a_corrected_pose_is_one_in_the_map() -> None:
     reports = []
     bench.graph.subscribe("/uav1/team", reports.append)
     bench.run(0.5)
-    place = reports[-1].message.position
-    assert (place.x, place.y) == pytest.approx((5.0, 10.0))
+    position = reports[-1].message.position
+    assert (position.x, position.y) == pytest.approx((5.0, 10.0))
 
 
 def test_another_area_is_no_part_of_this_search() -> None:

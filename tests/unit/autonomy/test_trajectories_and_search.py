@@ -19,9 +19,9 @@ def ground(x, y):
     return 0.1 * x + 0.05 * y
 
 
-def solid(obstacles, reach=30.0):
+def solid(obstacles, half_width=30.0):
     """Sloping ground with things (low corner, high corner above the ground) on it."""
-    x, y = (a.ravel() for a in np.meshgrid(*[np.arange(-reach, reach, 0.5)] * 2))
+    x, y = (a.ravel() for a in np.meshgrid(*[np.arange(-half_width, half_width, 0.5)] * 2))
     middles = [np.stack([x, y, ground(x, y)], -1)]
     for low, high in obstacles:
         steps = [np.arange(a + 0.1, b, 0.2) for a, b in zip(low, high, strict=True)]
@@ -52,25 +52,25 @@ def test_the_ground_and_distances_are_those_of_the_world(walled):
     assert not walled.is_free(99.0, 0.0, 3.0, 0.1)
 
 
-def test_a_way_leads_around_the_wall_over_the_sloping_ground(walled):
-    way = plan_path(walled, START, GOAL, 3.0, SEARCH, 1)
-    np.testing.assert_allclose(way[0, :2], START[:2])
-    np.testing.assert_allclose(way[-1, :2], GOAL[:2])
-    length = np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum()
+def test_a_path_leads_around_the_wall_over_the_sloping_ground(walled):
+    path = plan_path(walled, START, GOAL, 3.0, SEARCH, 1)
+    np.testing.assert_allclose(path[0, :2], START[:2])
+    np.testing.assert_allclose(path[-1, :2], GOAL[:2])
+    length = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).sum()
     assert 21.5 < length < 32.0
-    share = np.linspace(0.0, 1.0, 50)[:, None]
-    for a, b in itertools.pairwise(way):
-        places = a + share * (b - a)
+    fraction = np.linspace(0.0, 1.0, 50)[:, None]
+    for a, b in itertools.pairwise(path):
+        positions = a + fraction * (b - a)
         to_wall = np.hypot(
-            np.maximum(np.abs(places[:, 0]) - 0.3, 0), np.maximum(places[:, 1] - 4.0, 0)
+            np.maximum(np.abs(positions[:, 0]) - 0.3, 0), np.maximum(positions[:, 1] - 4.0, 0)
         )
         assert to_wall.min() > 0.4
-        above = places[:, 2] - ground(places[:, 0], places[:, 1])
+        above = positions[:, 2] - ground(positions[:, 0], positions[:, 1])
         assert above.min() > 1.5
         assert above.max() < 4.6
 
 
-def test_a_way_follows_from_its_seed_alone_whatever_other_threads_plan(walled):
+def test_a_path_follows_from_its_seed_alone_whatever_other_threads_plan(walled):
     alone = {seed: plan_path(walled, START, GOAL, 3.0, SEARCH, seed) for seed in range(4)}
     assert any(not np.array_equal(alone[0], alone[k]) for k in (1, 2, 3))
     found = {}
@@ -84,8 +84,8 @@ def test_a_way_follows_from_its_seed_alone_whatever_other_threads_plan(walled):
         thread.start()
     for thread in threads:
         thread.join()
-    for seed, way in alone.items():
-        np.testing.assert_array_equal(found[seed], way)
+    for seed, path in alone.items():
+        np.testing.assert_array_equal(found[seed], path)
 
 
 def test_a_goal_beside_a_wall_is_moved_and_one_deep_inside_is_refused():
@@ -93,11 +93,11 @@ def test_a_goal_beside_a_wall_is_moved_and_one_deep_inside_is_refused():
     space = VoxelSpace(solid([block]), 0.4, np.stack([START, GOAL]), 15.0)
     with pytest.raises(PlanError, match=r"the goal \(10.0, 0.0\)"):
         plan_path(space, START, GOAL, 3.0, SEARCH, 1)
-    way = plan_path(space, START, np.array([5.5, 0.0, 3.0]), 3.0, SEARCH, 1)
-    assert way[-1, 0] < 4.4
+    path = plan_path(space, START, np.array([5.5, 0.0, 3.0]), 3.0, SEARCH, 1)
+    assert path[-1, 0] < 4.4
 
 
-def test_no_way_is_said_after_a_bounded_search():
+def test_a_missing_path_is_reported_after_a_bounded_search():
     ring = [
         ((6.0, -4.0, 0.0), (6.6, 4.0, 8.0)),
         ((13.4, -4.0, 0.0), (14.0, 4.0, 8.0)),
@@ -158,28 +158,32 @@ def test_what_lies_behind_a_wall_or_is_not_known_has_not_been_seen():
     assert open_field.seen_m2 == pytest.approx(np.pi * 100.0, rel=0.12)  # cells at the rim
 
 
-def test_a_search_covers_its_area_with_little_way_to_spare():
-    field, place, heading, way = area(), np.array([2.0, 2.0]), 0.0, 0.0
+def test_a_search_covers_its_area_on_a_short_path():
+    field, position, heading, length = area(), np.array([2.0, 2.0]), 0.0, 0.0
     grid, goal = grid_of(), None
-    while way < 400.0:
-        field.look(place, *grid, 8.0)
-        gain = 0.0 if goal is None else field.gains(goal.place[None], 8.0)[0][0]
-        if goal is None or np.hypot(*(goal.place - place)) < 2.4 or gain < 0.15 * goal.gain_m2:
-            goal = next_viewpoint(field, place, heading, 8.0)
+    while length < 400.0:
+        field.look(position, *grid, 8.0)
+        gain = 0.0 if goal is None else field.gains(goal.position[None], 8.0)[0][0]
+        if (
+            goal is None
+            or np.hypot(*(goal.position - position)) < 2.4
+            or gain < 0.15 * goal.gain_m2
+        ):
+            goal = next_viewpoint(field, position, heading, 8.0)
             if goal is None:
                 break
-        heading = np.arctan2(*(goal.place - place)[::-1])
-        place = place + 2.0 * np.array([np.cos(heading), np.sin(heading)])
-        way += 2.0
+        heading = np.arctan2(*(goal.position - position)[::-1])
+        position = position + 2.0 * np.array([np.cos(heading), np.sin(heading)])
+        length += 2.0
     assert goal is None
-    assert field.share > 0.98
-    assert way < 2.2 * field.size_m2 / 16.0  # lanes of 16 m without any turn are 150 m
+    assert field.covered_fraction > 0.98
+    assert length < 2.2 * field.size_m2 / 16.0  # lanes of 16 m without any turn are 150 m
 
 
-def test_places_that_were_refused_are_not_tried_again():
-    field, place = area(), np.array([5.0, 5.0])
-    first = next_viewpoint(field, place, 0.0, 8.0)
-    second = next_viewpoint(field, place, 0.0, 8.0, [first.place])
-    assert np.hypot(*(first.place - second.place)) > 2.0
+def test_positions_that_were_refused_are_not_tried_again():
+    field, position = area(), np.array([5.0, 5.0])
+    first = next_viewpoint(field, position, 0.0, 8.0)
+    second = next_viewpoint(field, position, 0.0, 8.0, [first.position])
+    assert np.hypot(*(first.position - second.position)) > 2.0
     everywhere = [np.array([x, y]) for x in range(0, 60, 2) for y in range(0, 40, 2)]
-    assert next_viewpoint(field, place, 0.0, 8.0, everywhere) is None
+    assert next_viewpoint(field, position, 0.0, 8.0, everywhere) is None

@@ -1,4 +1,4 @@
-"""The page of figures: several runs of a bench are told by their median and their span."""
+"""The page of figures: several runs of a bench become their median and their span."""
 
 import json
 import re
@@ -14,7 +14,7 @@ def run(rays, bench="lidar", machine="a"):
     return Result(bench, {"processor": machine}, {"rays_per_s_1_thread": rays})
 
 
-def test_the_median_of_several_runs_is_judged_and_the_span_is_told():
+def test_the_median_of_several_runs_is_judged_and_the_span_is_printed():
     page = render([run(4e6), run(7e6), run(5e6)])
     assert "median of 3 runs" in page
     row = "| `rays_per_s_1_thread` | 5e+06 (4e+06 .. 7e+06) | >= 6e+06 (missed) |"

@@ -1,4 +1,4 @@
-"""Figures of the forest search from flights made up here, whose answers are known."""
+"""Figures of the forest search from synthetic flights, whose results are known."""
 
 from __future__ import annotations
 
@@ -27,11 +27,13 @@ def flown(start_x: float, y: float, *, off: float = 0.0, seconds: float = 60.0) 
     uav = Flown()
     for k in range(round(10 * seconds) + 1):
         t = k / 10.0
-        place = np.array([start_x + 2.0 * t, y])
-        uav.truth.append((t, *place, 3.0, *UPRIGHT))
-        uav.estimate.append((t, place[0], place[1] + off, 3.0, *UPRIGHT))
+        position = np.array([start_x + 2.0 * t, y])
+        uav.truth.append((t, *position, 3.0, *UPRIGHT))
+        uav.estimate.append((t, position[0], position[1] + off, 3.0, *UPRIGHT))
         if k % 5 == 2:
-            uav.survey.add_scan(LEVEL, k * 100_000_000, scan_of(k * 100_000_000, STANDING - place))
+            uav.survey.add_scan(
+                LEVEL, k * 100_000_000, scan_of(k * 100_000_000, STANDING - position)
+            )
     return uav
 
 
@@ -60,7 +62,7 @@ def test_the_area_is_that_of_the_task_managers() -> None:
     assert area_of(search_scenario(2, 1, 10.0)) == (20.0, 240.0, 220.0, 440.0)
 
 
-def test_what_was_searched_is_a_band_along_the_way() -> None:
+def test_what_was_searched_is_a_band_along_the_path() -> None:
     search = search_of({"uav1": flown(40.0, 300.0)})
     band = 120.0 * 2.0 * SIGHT_M + math.pi * SIGHT_M**2
     assert search.searched_m2() == pytest.approx(band, rel=0.06)
@@ -74,9 +76,9 @@ def test_what_was_searched_is_a_band_along_the_way() -> None:
 def test_errors_of_poses_and_of_trunks() -> None:
     search = search_of({"uav1": flown(24.0, 254.0, off=0.7)})
     assert search.ate_rmse_m()["uav1"] == pytest.approx(0.0, abs=1e-6)  # moved as a whole
-    astray = np.hypot(26.0, 8.0)  # from the post to the nearest tree, 0.7 m north as it is told
+    offset = np.hypot(26.0, 8.0)  # from the post to the nearest tree, 0.7 m north as it is reported
     np.testing.assert_allclose(search.trunk_errors_m()[:2], [0.7, 0.7], atol=0.05)
-    np.testing.assert_allclose(search.trunk_errors_m(aligned=True), [0.0, 0.0, astray], atol=0.06)
+    np.testing.assert_allclose(search.trunk_errors_m(aligned=True), [0.0, 0.0, offset], atol=0.06)
     assert search.distances_m()["uav1"] == pytest.approx(120.0)
 
 

@@ -9,11 +9,11 @@ from volery_benchmarks.registry import BENCHES
 
 
 def test_calls_without_an_answer_count_as_the_longest():
-    answers = [(0.02 * k, 0.02 * k + 0.001, 5.0 + 0.02 * k) for k in range(50)]
-    figures = measuring.call_figures(answers, 50)
+    responses = [(0.02 * k, 0.02 * k + 0.001, 5.0 + 0.02 * k) for k in range(50)]
+    figures = measuring.call_figures(responses, 50)
     assert figures["rtf"] == pytest.approx(1.0)
     assert figures["delay_p99_ms"] == pytest.approx(1.0)
-    assert measuring.call_figures(answers, 60)["delay_p99_ms"] == 10_000.0
+    assert measuring.call_figures(responses, 60)["delay_p99_ms"] == 10_000.0
     assert measuring.call_figures([], 60) == {"rtf": 0.0, "delay_p99_ms": 10_000.0}
 
 

@@ -1,4 +1,4 @@
-"""Tables and picture of the latencies, from figures that are known."""
+"""Tables and figure of the latencies, from figures that are known."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_end_points_are_means_of_trials():
     }
 
 
-def test_one_way_is_told_by_the_number_that_a_command_carries():
+def test_one_way_latency_matches_commands_by_their_number():
     applied = {0.1: 5_000_000, 0.2: 9_000_000}
     assert one_way_latencies([(0.2, 8_000_000), (0.1, 1_000_000)], applied) == [0.001, 0.004]
 
@@ -67,22 +67,22 @@ def test_the_tables_hold_all_three(tmp_path):
     assert "- machine 2: processor another, numpy 2.0\n" in text
 
 
-def test_the_page_and_its_picture_are_written(tmp_path):
+def test_the_page_and_its_image_are_written(tmp_path):
     measured = tmp_path / "bench.json"
     measured.write_text(json.dumps([{**result().as_dict(), "bench": "lidar"}, result().as_dict()]))
     results = latency_page.bridge_results([measured])
     latency_page.write(tmp_path, results)
     text = (tmp_path / "bridge_latency.md").read_text()
     assert "](pictures/bridge_latency.svg)" in text
-    picture = (tmp_path / "pictures/bridge_latency.svg").read_text()
-    ET.fromstring(picture)
+    image = (tmp_path / "pictures/bridge_latency.svg").read_text()
+    ET.fromstring(image)
     for name in ("Volery: L = 0.002", "the 2025 article", "ROS-TCP-Endpoint 0.7.0"):
-        assert name in picture
+        assert name in image
     latency_page.write(tmp_path, results)
-    assert (tmp_path / "pictures/bridge_latency.svg").read_text() == picture
+    assert (tmp_path / "pictures/bridge_latency.svg").read_text() == image
 
 
-def test_results_without_the_figures_are_told(tmp_path):
+def test_results_without_the_figures_are_reported(tmp_path):
     old = result()
     del old.figures["latency_stop_10x10_ms"]
     with pytest.raises(VoleryError, match=r"latency_stop_10x10_ms.*volery bench bridge"):

@@ -98,13 +98,13 @@ def test_folder_that_does_not_exist_cannot_be_installed(tmp_path: Path) -> None:
 def test_environment_is_made_once_and_used_again(tmp_path: Path) -> None:
     nothing = peer(requirements=("pip",))  # in every environment from the start
     python = environment(nothing, tmp_path)
-    answer = subprocess.run(
+    response = subprocess.run(
         [python, "-I", "-c", "import sys; print(sys.prefix); import pip"],
         capture_output=True,
         text=True,
         check=True,
     )
-    assert Path(answer.stdout.strip()) == python.parent.parent
+    assert Path(response.stdout.strip()) == python.parent.parent
     (python.parent.parent / "kept").touch()
     assert environment(nothing, tmp_path, timeout_s=1e-3) == python
     assert (python.parent.parent / "kept").exists()
@@ -118,19 +118,19 @@ def test_unwritable_cache_is_a_failure_of_the_peer(tmp_path: Path) -> None:
         environment(peer(), tmp_path / "file" / "peers")
 
 
-# ------------------------------------------------------------------------------- conversation
+# ------------------------------------------------------------------------------- peer processes
 
 
-def test_words_and_answers(tmp_path: Path) -> None:
+def test_requests_and_responses(tmp_path: Path) -> None:
     script = tmp_path / "good.py"
     script.write_text(GOOD)
     request = {"packages": ["numpy"], "places": [[0.0, 1.0, 2.0]]}
-    with PeerProcess(HERE, script, request, tmp_path) as conversation:
-        assert conversation.versions() == {"numpy": np.__version__}
+    with PeerProcess(HERE, script, request, tmp_path) as process:
+        assert process.versions() == {"numpy": np.__version__}
         begun_s = time.perf_counter()
-        round_s = conversation.round()
+        round_s = process.round()
         assert 0.002 <= round_s <= time.perf_counter() - begun_s
-        assert conversation.facts() == {"position_error_m": 0.01, "request": request}
+        assert process.facts() == {"position_error_m": 0.01, "request": request}
 
 
 @pytest.mark.parametrize(
@@ -141,17 +141,17 @@ def test_words_and_answers(tmp_path: Path) -> None:
         (SLOW, 0.5, "no response to 'round' within 0.5 s"),
     ],
 )
-def test_failures_of_a_script_are_told(
+def test_failures_of_a_script_are_reported(
     tmp_path: Path, script: str, timeout_s: float, message: str
 ) -> None:
     file = tmp_path / "bad.py"
     file.write_text(script)
     request = {"packages": []}
-    with PeerProcess(HERE, file, request, tmp_path, round_timeout_s=timeout_s) as conversation:
+    with PeerProcess(HERE, file, request, tmp_path, round_timeout_s=timeout_s) as process:
 
         def converse() -> None:
-            conversation.versions()
-            conversation.round()
+            process.versions()
+            process.round()
 
         with pytest.raises(PeerError, match=re.escape(message)):
             converse()
@@ -217,7 +217,7 @@ def test_failed_installation_is_reported_once_and_the_bench_goes_on(tmp_path: Pa
     )
 
 
-def test_ours_holds_its_places(tmp_path: Path) -> None:
+def test_ours_holds_its_positions(tmp_path: Path) -> None:
     task = hover_task(HOVER)
     task.ours()
     assert task.amount == 4 * 500
@@ -335,7 +335,7 @@ def test_page_shows_a_table_of_peers_and_what_failed() -> None:
     assert "- not measured: pyflyt: cannot be installed: no wheel\n" in text
 
 
-def test_command_tells_figures_and_failures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_prints_figures_and_failures(monkeypatch: pytest.MonkeyPatch) -> None:
     found = Measured({"fake_4_drones_ours_steps_per_s": 5.0}, {"fake": "no wheel"}, {"fake": "1"})
     module = SimpleNamespace(measure=lambda: found)
     monkeypatch.setattr(registry.importlib, "import_module", lambda name: module)

@@ -13,9 +13,9 @@ def test_figures_leave_the_first_calls_out():
     assert figures["way_one_way_ms"] == 6.0
     assert figures["way_round_trip_ms"] == 12.0
     assert figures["way_one_way_p95_ms"] == 10.5
-    assert {f"{way}_one_way_ms" for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")} == set(
-        BENCHES["search"].bounds
-    )
+    assert {
+        f"{connection}_one_way_ms" for connection in ("lock_step", "rosbridge", "ros_tcp", "ros1")
+    } == set(BENCHES["search"].bounds)
 
 
 def test_calls_over_a_bridge_are_timed_in_both_processes(monkeypatch):

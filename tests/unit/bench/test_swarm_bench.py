@@ -77,7 +77,7 @@ def test_a_crowd_flies_in_full_physics() -> None:
     flight = crowds.fly(Crowd(start, -start), "orca", seed=1)
     assert flight.crashed == 0
     assert flight.arrived
-    assert 1.0 < flight.least_distance_m < 3.0
+    assert 1.0 < flight.min_distance_m < 3.0
     assert 4.0 < flight.seconds < 60.0  # 12 m at 3 m/s
 
 

@@ -136,9 +136,9 @@ def test_names_load_nothing_heavy():
 def test_an_unknown_name_brings_a_hint_and_the_list():
     with pytest.raises(BridgeError) as error:
         make_bridge("mavlnk=14550", BridgeOptions())
-    told = str(error.value)
-    assert told.startswith("no bridge 'mavlnk'; did you mean 'mavlink'? Bridges: ")
-    assert all(name in told for name in SHIPPED)
+    message = str(error.value)
+    assert message.startswith("no bridge 'mavlnk'; did you mean 'mavlink'? Bridges: ")
+    assert all(name in message for name in SHIPPED)
 
 
 def test_missing_metadata_is_named(monkeypatch):

@@ -11,7 +11,7 @@ from volery.scenario.load import load_scenario
 PROFILES = Path(__file__).parents[3] / "examples/profiles"
 RADIO = "radio"
 DIFFERENT: dict[tuple[str, str], dict[str, Any]] = {
-    # Where nobody knows the place of take-off it is measured.
+    # Without a known position of take-off it is measured.
     (name, "slam"): {"initial_pose": [24.0, 260.0, 144.2, 0.0]}
     for name in ("simulation", "ground_test", "flight_test")
 } | {("flight_test", "local_planner"): {"speed_m_s": 1.5}}

@@ -134,16 +134,16 @@ def test_summary(tmp_path: Path, flight: Flight, suffix: str) -> None:
     assert scan.rate_hz == pytest.approx(40.0)
 
 
-def test_a_topic_that_nobody_spoke_on_has_no_rate(tmp_path: Path) -> None:
+def test_a_topic_without_messages_has_no_rate(tmp_path: Path) -> None:
     """As recorders of ROS 2 leave them."""
     path = tmp_path / "silent.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start("ros2")
         schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-        _, heard = (writer.register_channel(name, "cdr", schema) for name in ("/a", "/b"))
+        _, channel = (writer.register_channel(name, "cdr", schema) for name in ("/a", "/b"))
         for k in range(11):
-            writer.add_message(heard, k * 10**8, b"", k * 10**8)
+            writer.add_message(channel, k * 10**8, b"", k * 10**8)
         writer.finish()
     assert {t.topic: t.rate_hz for t in summarize(path).topics} == {"/a": 0.0, "/b": 10.0}
 

@@ -40,19 +40,19 @@ def world():
 
 
 class Parrot(Node):
-    """Repeats what it hears, on a timer too, and serves."""
+    """Repeats what it receives, on a timer too, and serves."""
 
     def __init__(self, **options):
         super().__init__("parrot", **options)
         self.word = self.declare_parameter("word", "polly").value
         self.times = []
         self.out = self.create_publisher(String, "said", 10)
-        self.create_subscription(String, "heard", self.on_heard)
+        self.create_subscription(String, "heard", self.on_word)
         self.create_timer(0.5, self.on_timer)
         self.create_service(TRIGGER, "do", self.on_do)
         self.ask = self.create_client(TRIGGER, "/there/do")
 
-    def on_heard(self, message):
+    def on_word(self, message):
         if message.data == "break":
             raise ValueError("broken")
         self.out.publish(String(f"{self.word} {message.data}"))
@@ -88,7 +88,7 @@ def test_two_publishers_of_one_topic_on_one_connection(world):
     assert session.info.publishes == ()
 
 
-def test_topics_and_services_both_ways(world):
+def test_topics_and_services_in_both_directions(world):
     session = world.gateway.open("node")
     host = NodeHost(session)
     node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
@@ -97,8 +97,8 @@ def test_topics_and_services_both_ways(world):
     world.do(
         lambda: world.graph.create_service("/there/do", TRIGGER, lambda _r: Response(True, "there"))
     )
-    heard = world.graph.advertise("/uav1/heard", String)
-    world.do(lambda: heard.publish(String("you")))
+    publisher = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: publisher.publish(String("you")))
     spin_until(host, lambda: said)
     assert said[0].message.data == "hi you"
 
@@ -123,7 +123,7 @@ def test_nodes_that_are_there_before_their_graph(world):
     node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
     lost = node.create_publisher(String, "lost", 10)
     lost.publish(String("early"))
-    node.create_subscription(String, "noise", node.on_heard).cancel()
+    node.create_subscription(String, "noise", node.on_word).cancel()
     host.spin_once(0.0)
     assert not opened
     said, early, answers = [], [], []
@@ -135,8 +135,8 @@ def test_nodes_that_are_there_before_their_graph(world):
     late.join()
     late.join()
     assert len(opened) == 1
-    heard = world.graph.advertise("/uav1/heard", String)
-    world.do(lambda: heard.publish(String("you")))
+    publisher = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: publisher.publish(String("you")))
     answer = node.ask.call_async()
     world.do(
         lambda: world.graph.call_async(
@@ -152,7 +152,7 @@ def test_nodes_that_are_there_before_their_graph(world):
     late.close()
 
 
-def test_who_calls_a_service_at_its_start_has_the_graph_joined(world):
+def test_a_node_that_calls_a_service_at_its_start_joins_the_graph(world):
     world.do(
         lambda: world.graph.create_service("/there/do", TRIGGER, lambda _r: Response(True, "there"))
     )
@@ -176,7 +176,7 @@ def test_timers_can_be_put_off(world):
     assert node.times[0] - begin_ns >= 8 * 10**8
 
 
-def test_a_service_that_nobody_offers(world):
+def test_a_service_without_a_server(world):
     host = NodeHost(world.gateway.open("node"))
     node = Parrot(context=host.context())
     with pytest.raises(GraphError, match="has no server"):
@@ -223,8 +223,8 @@ def test_without_a_clock_the_computers_counts(world):
 def test_what_a_node_breaks_ends_the_host_with_its_name(world):
     host = NodeHost(world.gateway.open("node"))
     Parrot(context=host.context(), namespace="/uav1")
-    heard = world.graph.advertise("/uav1/heard", String)
-    world.do(lambda: heard.publish(String("break")))
+    publisher = world.graph.advertise("/uav1/heard", String)
+    world.do(lambda: publisher.publish(String("break")))
     with pytest.raises(NodeError, match="uav1/parrot"):
         host.spin(lambda: False)
 
@@ -257,7 +257,7 @@ def test_the_order_of_arrival_is_kept_across_topics(world):
     assert node.seen == list("01234")
 
 
-def test_what_nobody_reads_or_publishes_any_more_ends_over_there(world):
+def test_cancelled_publishers_and_subscriptions_end_in_the_remote_graph(world):
     host = NodeHost(world.gateway.open("node"), clock="wall")
     first, second = (host.graph.subscribe("/a", print, String) for _ in range(2))
     publisher = host.graph.advertise("/b", String)

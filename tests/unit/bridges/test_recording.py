@@ -74,7 +74,7 @@ def camera(bench, base, *ends):
 
 
 def recorded(bench, path, **options):
-    """Topics that are recorded of two cameras, the second without compressed pictures."""
+    """Topics that are recorded of two cameras, the second without compressed images."""
     recorder = Recorder(bench.graph, create_log(path), **options)
     recorder.start()
     ends = ("/camera_info", "/image_raw", "/depth", "/points", "/labels/instance")
@@ -88,7 +88,7 @@ def recorded(bench, path, **options):
     return found, wanted
 
 
-def test_no_picture_is_recorded_twice(bench, tmp_path):
+def test_no_image_is_recorded_twice(bench, tmp_path):
     found, wanted = recorded(bench, tmp_path / "a.mcap")
     assert found == {
         *("/uav1/front/camera_info", "/uav1/front/image_raw/compressed", "/uav1/front/depth"),
@@ -98,7 +98,7 @@ def test_no_picture_is_recorded_twice(bench, tmp_path):
     assert wanted == found  # the others are not even made
 
 
-def test_patterns_choose_forms_of_pictures(bench, tmp_path):
+def test_patterns_choose_forms_of_images(bench, tmp_path):
     found, wanted = recorded(bench, tmp_path / "a.mcap", topics=["/**/image_raw"])
     assert found == {"/uav1/front/image_raw", "/uav1/bare/image_raw"}
     assert wanted - {"/uav1/points"} == found
@@ -147,8 +147,8 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(bench, tmp_path, monkey
     log = create_log(tmp_path / "flight.mcap")
     recorder = Recorder(bench.graph, log)
     recorder.start()
-    heard = []
-    bench.graph.subscribe("/x", heard.append, String)
+    received = []
+    bench.graph.subscribe("/x", received.append, String)
 
     def full(*_arguments):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -156,7 +156,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(bench, tmp_path, monkey
     monkeypatch.setattr(os, "pwrite", full)
     for _ in range(30):
         bench.say("/x", os.urandom(80_000).hex())
-    assert len(heard) == 30
+    assert len(received) == 30
     assert not recorder.info.running
     assert "No space left" in recorder.info.failure
     with pytest.raises(RecordingError, match="No space left"):

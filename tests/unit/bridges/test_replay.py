@@ -1,4 +1,4 @@
-"""Logs played into a graph: every message, its bytes and its time; damaged logs; ways through."""
+"""Logs played into a graph: every message, its bytes and its time; damaged logs; positions."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class World:
     def __init__(self, start_ns=0):
         self.now_ns = start_ns
         self.graph = Graph(lambda: self.now_ns)
-        self.heard = []
+        self.received = []
         self._due = []
         self._added = 0
         self.calls = 0
-        self.graph.subscribe_all(self.heard.append)
+        self.graph.subscribe_all(self.received.append)
 
     def at(self, time_ns, action):
         heapq.heappush(self._due, (max(time_ns, self.now_ns), self._added, action))
@@ -57,7 +57,7 @@ class World:
 
     def restore(self, now_ns, due):
         self.now_ns, self._due = now_ns, list(due)
-        self.heard.clear()
+        self.received.clear()
 
     def play(self, path, **options):
         replay = Replay(path, **options)
@@ -65,7 +65,7 @@ class World:
         return replay
 
 
-def told(messages):
+def fields_of(messages):
     return [(p.topic, p.msgtype, p.time_ns, p.cdr) for p in messages]
 
 
@@ -85,17 +85,17 @@ def strings(path, *times_ms, topic="/a"):
 
 
 def said(world, topic="/a"):
-    return [(p.time_ns // 1_000_000, p.message.data) for p in world.heard if p.topic == topic]
+    return [(p.time_ns // 1_000_000, p.message.data) for p in world.received if p.topic == topic]
 
 
 @pytest.fixture(scope="module")
 def hover():
     """All messages of half a second of a hovering UAV."""
-    heard = []
+    received = []
     with Simulation(load_scenario("hover"), threads=1) as simulation:
-        simulation.graph.subscribe_all(heard.append)
+        simulation.graph.subscribe_all(received.append)
         simulation.run(0.5)
-    return heard
+    return received
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -112,7 +112,7 @@ def test_a_recorded_flight_played_into_a_fresh_graph_is_the_same(tmp_path, suffi
     world.run()
     assert len(hover) > 100
     assert {p.topic for p in hover} >= {"/clock", "/uav1/odom", "/uav1/imu", "/tf_static"}
-    assert told(world.heard) == told(hover)
+    assert fields_of(world.received) == fields_of(hover)
     info = replay.info
     assert (info.running, info.published, info.skipped) == (False, len(hover), 0)
     assert (info.problem, info.refused, info.laps) == ("", {}, 1)
@@ -120,19 +120,19 @@ def test_a_recorded_flight_played_into_a_fresh_graph_is_the_same(tmp_path, suffi
 
 def test_played_into_a_running_simulation(tmp_path, hover):
     path = write(tmp_path / "hover.mcap", hover)
-    heard = []
+    received = []
     with Simulation(load_scenario("hover"), threads=1) as simulation:
         simulation.run(0.1)
         began_ns = simulation.time_ns
         replay = Replay(path, topics=("/uav1/imu",), remap={"/uav1/**": "/ghost/**"})
         engine = simulation._engine
         simulation.post(lambda: replay.start(simulation.graph, engine, lambda: engine.time_ns))
-        simulation.graph.subscribe("/ghost/imu", heard.append, m.Imu)
+        simulation.graph.subscribe("/ghost/imu", received.append, m.Imu)
         simulation.run(0.6)
     recorded = [p for p in hover if p.topic == "/uav1/imu"]
     first_ns = hover[0].time_ns
-    assert [p.cdr for p in heard] == [p.cdr for p in recorded]
-    assert [p.time_ns for p in heard] == [p.time_ns - first_ns + began_ns for p in recorded]
+    assert [p.cdr for p in received] == [p.cdr for p in recorded]
+    assert [p.time_ns for p in received] == [p.time_ns - first_ns + began_ns for p in recorded]
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_messages_of_one_instant_keep_their_order(tmp_path):
     assert world.calls == 1
 
 
-def test_who_is_out_of_order_comes_with_the_one_before(tmp_path):
+def test_a_message_out_of_order_comes_with_the_one_before(tmp_path):
     path = strings(tmp_path / "x.mcap", 10, 30, 5, 20, 40)
     world = World()
     world.play(path)
@@ -201,7 +201,7 @@ def test_a_loop_over_one_message_moves_on(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_static_transforms_await_those_who_come_later(tmp_path, hover, suffix):
+def test_static_transforms_await_late_subscribers(tmp_path, hover, suffix):
     path = write(tmp_path / f"hover{suffix}", hover)
     world = World()
     replay = world.play(path, begin_s=0.3)
@@ -276,9 +276,9 @@ def test_a_cut_log_is_played_up_to_the_cut(tmp_path, flight, suffix):
     replay = world.play(path, exclude=())
     world.run()
     assert "cut off" in replay.info.problem
-    count = len(world.heard)
+    count = len(world.received)
     assert 0 < count < len(messages)
-    assert told(world.heard) == told(messages[:count])
+    assert fields_of(world.received) == fields_of(messages[:count])
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -289,14 +289,14 @@ def test_no_damage_is_fatal(tmp_path_factory, suffix, harm):
     path.unlink(missing_ok=True)
     strings(path, *range(50))
     data = bytearray(path.read_bytes())
-    for share, text in harm:
-        place = 20 + round(share * (len(data) - 20))
-        data[place : place + len(text)] = text
+    for fraction, text in harm:
+        offset = 20 + round(fraction * (len(data) - 20))
+        data[offset : offset + len(text)] = text
     path.write_bytes(data)
     world = World()
     world.play(path)
     world.run(10_000_000_000)
-    assert len(world.heard) <= 50
+    assert len(world.received) <= 50
 
 
 def test_bytes_that_are_no_message_are_left_out(tmp_path):
@@ -355,11 +355,11 @@ def test_types_that_only_the_bag_knows(tmp_path):
     replay = world.play(path)
     world.run()
     assert replay.info.refused == {}
-    (heard,) = world.heard
-    assert heard.msgtype == "acme_msgs/msg/Sound"
-    assert heard.message.loudest.name == "a"
-    assert heard.message.header.stamp.sec == 1
-    assert heard.message.levels.tolist() == [1.0, 2.0]
+    (received,) = world.received
+    assert received.msgtype == "acme_msgs/msg/Sound"
+    assert received.message.loudest.name == "a"
+    assert received.message.header.stamp.sec == 1
+    assert received.message.levels.tolist() == [1.0, 2.0]
 
 
 def test_a_type_of_the_same_name_that_is_another(tmp_path):
@@ -373,10 +373,10 @@ def test_a_type_of_the_same_name_that_is_another(tmp_path):
     replay = world.play(path)
     world.run()
     assert replay.info.refused == {}
-    (heard,) = world.heard
-    assert heard.msgtype.startswith("std_msgs_")
-    assert heard.msgtype.endswith("/msg/String")
-    assert heard.message.data == 7
+    (received,) = world.received
+    assert received.msgtype.startswith("std_msgs_")
+    assert received.msgtype.endswith("/msg/String")
+    assert received.message.data == 7
 
 
 @pytest.mark.parametrize(
@@ -389,7 +389,7 @@ def test_a_type_of_the_same_name_that_is_another(tmp_path):
         ("cdr", "ros2msg", "other_msgs/msg/New", b"no/Such x\n", "no/"),
     ],
 )
-def test_what_cannot_be_read_is_told(tmp_path, encoding, schema, name, text, words):
+def test_what_cannot_be_read_is_reported(tmp_path, encoding, schema, name, text, words):
     path = tmp_path / "x.mcap"
     with path.open("wb") as file:
         writer = Writer(file)

@@ -16,7 +16,7 @@ from volery.core.errors import BridgeError, UnreachableError
 
 @pytest.fixture
 def elsewhere(monkeypatch, tmp_path):
-    """A folder in Debian's place, for an environment without rospy."""
+    """A folder instead of Debian's, for an environment without rospy."""
     monkeypatch.setattr(ros1_environment, "_DEBIAN", tmp_path)
     monkeypatch.setenv("ROS_DISTRO", "none_such")
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)

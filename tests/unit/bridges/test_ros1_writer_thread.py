@@ -75,7 +75,7 @@ def test_messages_arrive_whole_and_in_order(pair, selector):
     reader.close()
 
 
-def test_who_stands_still_loses_the_middle_but_no_frame_is_torn(pair, selector):
+def test_a_stalled_reader_loses_the_middle_but_no_frame_is_torn(pair, selector):
     ours, theirs = pair
     reader = Reader(Connection(ours), selector)
     for k in range(100):
@@ -99,7 +99,7 @@ def test_who_stands_still_loses_the_middle_but_no_frame_is_torn(pair, selector):
     reader.close()
 
 
-def test_who_has_gone_is_given_up(pair, selector):
+def test_a_reader_that_has_gone_is_given_up(pair, selector):
     ours, theirs = pair
     connection = Connection(ours)
     reader = Reader(connection, selector)

@@ -93,9 +93,9 @@ def other(world):
     made.close()
 
 
-def test_nodes_and_their_endpoints_are_told(world, other):
-    """As rmw_dds_common tells them: a latched record a participant."""
-    heard = []
+def test_nodes_and_their_endpoints_are_published(world, other):
+    """As rmw_dds_common publishes them: a latched record a participant."""
+    records = []
     inner = other.participant._participant
     reader = DataReader(
         inner,
@@ -104,9 +104,11 @@ def test_nodes_and_their_endpoints_are_told(world, other):
     )
 
     def names():
-        heard.extend(decode_cdr(s.cdr, RECORD) for s in reader.take(10) if s.sample_info.valid_data)
+        records.extend(
+            decode_cdr(s.cdr, RECORD) for s in reader.take(10) if s.sample_info.valid_data
+        )
         found = {}
-        for record in heard:
+        for record in records:
             for entry in record.node_entities_info_seq:
                 found[entry.node_namespace, entry.node_name] = entry
         return found
@@ -128,13 +130,13 @@ def test_a_record_has_the_bytes_of_rmw():
     )  # fmt: skip
 
 
-def test_messages_are_made_into_bytes_only_while_somebody_listens(world, other):
+def test_messages_are_encoded_only_for_subscribers(world, other):
     topic = {t.name: t for t in world.graph.topics()}["/chatter"]
     assert topic.subscribers == 0
-    heard = other.hear("/chatter", STRING)
+    received = other.subscribe("/chatter", STRING)
     until(lambda: {t.name: t for t in world.graph.topics()}["/chatter"].subscribers)
     world.do(lambda: world.chatter.publish(String("hello")))
-    assert heard.get(timeout=60.0).data == "hello"
+    assert received.get(timeout=60.0).data == "hello"
 
 
 def test_bytes_are_made_once_for_all_bridges(world, other, monkeypatch):
@@ -144,20 +146,20 @@ def test_bytes_are_made_once_for_all_bridges(world, other, monkeypatch):
     there = Other(Ros2Environment(domain_id=DOMAIN + 1))
     try:
         image = world.graph.advertise("/once", STRING)
-        heard = [one.hear("/once", STRING) for one in (other, there)]
+        received = [one.subscribe("/once", STRING) for one in (other, there)]
         until(lambda: {t.name: t for t in world.graph.topics()}["/once"].subscribers == 2)
         store, made = typestore(), []
         original = store.serialize_cdr
         monkeypatch.setattr(store, "serialize_cdr", lambda *a: made.append(a) or original(*a))
         world.do(lambda: image.publish(String("once")))
-        assert [h.get(timeout=60.0).data for h in heard] == ["once", "once"]
+        assert [h.get(timeout=60.0).data for h in received] == ["once", "once"]
         assert len([1 for message, _ in made if getattr(message, "data", "") == "once"]) == 1
     finally:
         there.close()
         bridges.close()
 
 
-def test_best_effort_publishers_are_heard_too(world, other):
+def test_messages_of_best_effort_publishers_are_received_too(world, other):
     writer, publish = other.speak(
         "/uav1/cmd_vel", "geometry_msgs/msg/Twist", Profile(reliable=False)
     )
@@ -192,12 +194,12 @@ def test_names_that_ros2_does_not_allow_stay_inside(world, other):
     assert not any("gr" in p.topic for p in other.participant.publishers())
 
 
-def test_other_domains_are_not_heard(world):
-    """Not by the time at which what came later in its own domain is heard."""
+def test_messages_of_other_domains_are_not_received(world):
+    """Not by the time at which a later message in its own domain is received."""
     elsewhere = Ros2Environment(domain_id=DOMAIN + 2)
     stranger, friend_there, friend = Other(elsewhere), Other(elsewhere), Other()
     _, publish = stranger.speak("/uav1/cmd_vel", TWIST)
-    heard_there = friend_there.hear("/uav1/cmd_vel", TWIST)
+    received_there = friend_there.subscribe("/uav1/cmd_vel", TWIST)
     _, publish_here = friend.speak("/uav1/cmd_vel", TWIST)
     theirs, ours = zero_message(TWIST), zero_message(TWIST)
     theirs.linear.x, ours.linear.x = 2.5, 3.5
@@ -206,7 +208,7 @@ def test_other_domains_are_not_heard(world):
         publish(theirs)
         publish_here(ours)
         time.sleep(0.01)
-        return heard_there.qsize() and any(c.message.linear.x == 3.5 for c in world.commands)
+        return received_there.qsize() and any(c.message.linear.x == 3.5 for c in world.commands)
 
     until(both_arrive)
     assert not any(c.message.linear.x == 2.5 for c in world.commands)
@@ -220,7 +222,7 @@ def test_one_domain_has_one_configuration_in_a_process(world):
         join_ros2(Ros2Environment(domain_id=DOMAIN, interfaces=("eth0",)))
 
 
-def test_sockets_hear_this_machine_alone(world):
+def test_sockets_receive_from_this_machine_alone(world):
     # Otherwise Python makes every socket non-blocking that it wraps, for its owner as well.
     default = socket.getdefaulttimeout()
     socket.setdefaulttimeout(None)
@@ -247,14 +249,14 @@ def _confined():
     return found
 
 
-def test_interfaces_that_there_are_not_are_told():
+def test_unknown_interfaces_are_an_error():
     with pytest.raises(
         BridgeError, match="unknown network interface 'no_such_interface'; known are "
     ):
         join_ros2(Ros2Environment(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
 
 
-def test_failures_are_told_where_there_is_room(world, other):
+def test_failures_are_reported_in_responses_with_a_message(world, other):
     answer = other.call("/broken", TRIGGER)
     assert not answer.success
     assert answer.message
@@ -287,18 +289,18 @@ def test_parameters_are_listed_described_and_read(world, other):
     assert parameters(other, "ListParameters", node="/volery").result.names == ["use_sim_time"]
 
 
-def test_parameters_are_set_and_that_is_told(world, other):
-    events = other.hear("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
+def test_parameters_are_set_and_an_event_is_published(world, other):
+    events = other.subscribe("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
     until(lambda: any(p.topic == "/parameter_events" for p in other.participant.publishers()))
     wanted = [parameter_message("height_m", 4.5), parameter_message("name", "y")]
 
-    def is_told():
+    def is_published():
         results = parameters(other, "SetParameters", parameters=wanted).results
         assert [r.successful for r in results] == [True, False]
         assert "read-only" in results[1].reason
         return events.qsize()
 
-    until(is_told)
+    until(is_published)
     assert world.graph.parameters.get(NODE, "height_m").value == 4.5
     event = events.get(timeout=60.0)
     assert (event.node, event.changed_parameters[0].name) == (NODE, "height_m")
@@ -352,8 +354,8 @@ def result_of(other, number):
 
 
 def test_an_action_gives_feedback_and_a_result(world, other):
-    feedback = other.hear("/simulate_steps/_action/feedback", f"{STEPS}_FeedbackMessage")
-    status = other.hear(
+    feedback = other.subscribe("/simulate_steps/_action/feedback", f"{STEPS}_FeedbackMessage")
+    status = other.subscribe(
         "/simulate_steps/_action/status",
         "action_msgs/msg/GoalStatusArray",
         Profile(latched=True, depth=1),
@@ -366,9 +368,9 @@ def test_an_action_gives_feedback_and_a_result(world, other):
     progress.completed_steps = 4
     until(lambda: any("feedback" in p.topic for p in other.participant.publishers()))
     world.do(lambda: goal.feedback(progress))
-    told = feedback.get(timeout=60.0)
-    assert told.feedback.completed_steps == 4
-    assert told.goal_id.uuid.tolist() == [1] * 16
+    message = feedback.get(timeout=60.0)
+    assert message.feedback.completed_steps == 4
+    assert message.goal_id.uuid.tolist() == [1] * 16
     world.do(lambda: goal.succeed(zero_message(f"{STEPS}_Result")))
     assert result_of(other, 1).status == 4
     until(lambda: [s.status for s in status.get(timeout=60.0).status_list][-1:] == [4])
@@ -415,15 +417,15 @@ def test_scans_go_out_best_effort_and_the_clock_reliably(world, other):
     assert not found["/clock"].latched
 
 
-def test_who_does_not_fit_is_left_out_and_the_rest_goes_on(world, other, caplog):
+def test_a_message_that_does_not_fit_is_left_out_and_the_rest_goes_on(world, other, caplog):
     odd = world.graph.advertise("/odd", "std_msgs/msg/Header")
-    heard = other.hear("/odd", "std_msgs/msg/Header")
+    received = other.subscribe("/odd", "std_msgs/msg/Header")
     until(lambda: {t.name: t for t in world.graph.topics()}["/odd"].subscribers)
     broken = header(1, "x")
     broken.frame_id = 7
     world.do(lambda: odd.publish(broken))
     world.do(lambda: odd.publish(header(2, "fine")))
-    assert heard.get(timeout=60.0).frame_id == "fine"
+    assert received.get(timeout=60.0).frame_id == "fine"
     assert "/odd" in caplog.text
 
 
@@ -434,7 +436,7 @@ def test_a_bridge_without_a_name_of_ros2_does_not_open(world):
     bridges.close()
 
 
-def test_a_client_of_another_type_is_told_of(world, other, caplog):
+def test_a_client_of_another_type_is_reported(world, other, caplog):
     spec = ServiceSpec(other.node, "/broken", "std_srvs/srv/Empty")
     caller = other.participant.caller(spec)
     until(lambda: "a client of std_srvs/srv/Empty is not answered" in caplog.text)
@@ -482,7 +484,7 @@ def test_what_is_not_understood_is_named_by_the_vendor_of_its_dds():
     assert "a DDS of vendor 01.77" in why_foreign("clientid", b"\x01\x77" + rest)
 
 
-def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, other, caplog):
+def test_clients_and_servers_of_another_kind_are_reported_and_not_misread(world, other, caplog):
     """Those without the user data of rmw_cyclonedds, whatever DDS they are of."""
     inner = other.participant._participant
     asked = []

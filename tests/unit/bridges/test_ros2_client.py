@@ -28,17 +28,17 @@ TERMS = Ros2Environment(domain_id=DOMAIN + 5)
 
 
 class Parrot(Node):
-    """Repeats what it hears, serves, and reads a parameter each time anew."""
+    """Repeats what it receives, serves, and reads a parameter each time anew."""
 
     def __init__(self, **options):
         super().__init__("parrot", **options)
         self.word = self.declare_parameter("word", "polly", read_only=False)
         self.out = self.create_publisher(String, "said", 10)
-        self.create_subscription(String, "heard", self.on_heard)
+        self.create_subscription(String, "heard", self.on_word)
         self.create_service(TRIGGER, "do", lambda _q, response: Triggered(True, self.word.value))
         self.stamps = []
 
-    def on_heard(self, message):
+    def on_word(self, message):
         self.stamps.append(self.get_clock().now_ns())
         self.out.publish(String(f"{self.word.value} {message.data}"))
 
@@ -49,7 +49,7 @@ class Simulated(LiveGraph):
     def __init__(self):
         super().__init__()
         self.clock = self.graph.advertise("/clock", Clock)
-        self.heard = self.graph.advertise("/uav1/heard", STRING)
+        self.words = self.graph.advertise("/uav1/heard", STRING)
         self.said = []
         self.do(lambda: self.graph.subscribe("/uav1/said", self.said.append, STRING))
         self.graph.create_service("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
@@ -103,17 +103,17 @@ def counts(simulated):
 
 
 def test_a_node_of_ours_is_a_ros2_node(simulated, node):
-    until(lambda: counts(simulated)["/uav1/heard"][1] == 1)  # the bridge hears that it listens
+    until(lambda: counts(simulated)["/uav1/heard"][1] == 1)  # the bridge has found its subscription
     until(lambda: counts(simulated)["/clock"][1] == 1)
 
-    def clock_is_heard():
+    def clock_has_arrived():
         simulated.tick(5 * 10**9)
         return node.get_clock().now_ns() == 5 * 10**9
 
-    until(clock_is_heard)
+    until(clock_has_arrived)
 
     def answers():
-        simulated.do(lambda: simulated.heard.publish(String("hello")))
+        simulated.do(lambda: simulated.words.publish(String("hello")))
         return simulated.said
 
     until(answers)
@@ -142,11 +142,11 @@ def test_its_services_are_called(node, other):
 
 
 def test_a_link_finds_topics_that_are_only_subscribed(simulated, link, other):
-    other.hear("/wanted", STRING)
+    other.subscribe("/wanted", STRING)
     until(lambda: link.topic_types().get("/wanted") == STRING)
 
 
-def test_a_list_leaves_out_hidden_topics_and_says_who_was_asked(monkeypatch, capsys):
+def test_a_list_leaves_out_hidden_topics_and_names_the_graph(monkeypatch, capsys):
     class Found:
         where = "DDS domain 7 (this machine)"
         topics = {"/b": STRING, "/a/_action/status": STRING}  # noqa: RUF012
@@ -162,8 +162,8 @@ def test_a_list_leaves_out_hidden_topics_and_says_who_was_asked(monkeypatch, cap
     assert capsys.readouterr().out == "/b\n"
     Found.topics = {}
     list_topics("ros2://7", types=False)
-    told = capsys.readouterr()
-    assert (told.out, told.err) == ("", f"no topics found: {Found.where}\n")
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", f"no topics found: {Found.where}\n")
 
 
 def test_a_link_finds_topics_and_services(simulated, link):
@@ -203,7 +203,7 @@ def test_a_latched_message_awaits_late_links(link):
     assert link.published_type("/kept") is None
 
 
-def test_who_has_left_does_nothing(simulated):
+def test_a_client_that_has_left_does_nothing(simulated):
     link = Ros2Client(TERMS, "/leaver")
     link.create_service("/mine", TRIGGER, lambda _q, reply: reply.answer(Triggered(True, "")))
     with pytest.raises(GraphError, match="already"):

@@ -1,4 +1,4 @@
-"""What DDS endpoints tell of themselves is read whole, however many threads read at once."""
+"""What DDS endpoints announce of themselves is read whole by any number of threads at once."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def hasty():
     sys.setswitchinterval(before)
 
 
-def test_either_end_tells_its_own(pairs):
+def test_either_end_announces_its_own(pairs):
     for writer, reader, terms in pairs:
         (reader_handle,) = writer.get_matched_subscriptions()
         (writer_handle,) = reader.get_matched_publications()
@@ -123,11 +123,11 @@ def test_a_reading_in_the_midst_of_another_changes_nothing(monkeypatch, function
     original, seen = getattr(library, function), []
 
     def interrupted(*arguments):
-        told = original(*arguments)
+        result = original(*arguments)
         if not seen:
             seen.append(None)
             seen[0] = terms_at(there)
-        return told
+        return result
 
     monkeypatch.setattr(library, function, interrupted)
     assert terms_at(here) == ours
@@ -136,22 +136,22 @@ def test_a_reading_in_the_midst_of_another_changes_nothing(monkeypatch, function
         _CQos.cqos_destroy(qos)
 
 
-def test_who_leaves_is_told_of_without_terms(pairs):
+def test_an_endpoint_that_leaves_is_announced_without_terms(pairs):
     writer = pairs[0].writer
     source = announcements(writer.topic.participant, BuiltinTopicDcpsSubscription)
     there = pairs[0].reader.topic.participant
     reader = DataReader(there, Topic(there, "brief", message_struct(STRING)))
     key = reader.guid.bytes
-    heard = {}
+    received = {}
 
-    def hears():
-        heard.update((sample.key, sample) for sample in source.take(100))
-        return heard.get(key)
+    def newest():
+        received.update((sample.key, sample) for sample in source.take(100))
+        return received.get(key)
 
-    assert until(hears).terms is not None
-    heard.clear()
+    assert until(newest).terms is not None
+    received.clear()
     library.delete(reader)
-    gone = until(hears)
+    gone = until(newest)
     assert not gone.sample_info.valid_data
     assert (gone.terms, gone.dds_topic) == (None, None)
 

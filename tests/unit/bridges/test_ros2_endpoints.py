@@ -36,7 +36,7 @@ def test_a_client_that_is_closed_is_not_ready_and_in_no_problem(two):
     assert caller.problem == ""
 
 
-def test_what_is_due_and_fails_does_not_end_hearing(two, caplog):
+def test_a_failing_periodic_task_does_not_end_receiving(two, caplog):
     here, there = two
     failed = queue.Queue()
 
@@ -44,12 +44,12 @@ def test_what_is_due_and_fails_does_not_end_hearing(two, caplog):
         failed.put(None)
         raise RuntimeError("no such luck")
 
-    heard = here.hear("/in", STRING)
-    here.participant._ear._now_and_then = fail
+    received = here.subscribe("/in", STRING)
+    here.participant._reader_thread._now_and_then = fail
     for _ in range(2):
         failed.get(timeout=60.0)
     assert "no such luck" in caplog.text
     writer, publish = there.speak("/in", STRING)
     until(lambda: writer.matched)
     publish(String("still there"))
-    assert heard.get(timeout=60.0).data == "still there"
+    assert received.get(timeout=60.0).data == "still there"

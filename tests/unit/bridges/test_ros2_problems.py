@@ -33,21 +33,21 @@ class World(LiveGraph):
 
     def __init__(self):
         super().__init__()
-        self.heard, self.seen = queue.Queue(), []
+        self.received, self.seen = queue.Queue(), []
         self.chatter = self.graph.advertise("/chatter", STRING)
-        self.pictures = self.graph.advertise("/pictures", IMAGE)
+        self.images = self.graph.advertise("/pictures", IMAGE)
         self.atlas = self.graph.advertise("/atlas", IMAGE, latched=True)
         self.do(lambda: self.graph.subscribe("/in", self.note, STRING))
         self.bridges = BridgeHost(self.gateway)
         self.bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN), reliable=("/pictures",)))
-        self.witness = take_peer(self.heard.put)
-        self.hear(self.witness, "/chatter", STRING)
+        self.witness = take_peer(self.received.put)
+        self.subscribe(self.witness, "/chatter", STRING)
         assert self.witness.do("advertise", topic="/in", type=STRING, latched=False, wait=True)
 
     def note(self, published):
         self.seen.append(published.message.data)
 
-    def hear(self, peer, topic, msgtype, *, latched=False):
+    def subscribe(self, peer, topic, msgtype, *, latched=False):
         """Have a peer subscribe reliably, and wait for the bridge to know."""
         found = {t.name: t for t in self.graph.topics()}[topic]
         peer.do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
@@ -58,13 +58,13 @@ class World(LiveGraph):
         return {t.name: t for t in self.graph.topics()}[topic].subscribers > 0
 
     def goes_on(self):
-        """Send a word each way, and wait until both are there."""
+        """Send a word in each direction, and wait until both are there."""
         word = f"word {next(_numbers)};"
         self.do(lambda: self.chatter.publish(String(word)))
         publish(self.witness, "/in", encode_cdr(String(word), STRING))
         while True:
-            told = base64.b64decode(self.heard.get(timeout=60.0)["data"])
-            if word.encode() in told:
+            data = base64.b64decode(self.received.get(timeout=60.0)["data"])
+            if word.encode() in data:
                 break
         until(lambda: word in self.seen)
         return True
@@ -79,7 +79,7 @@ def publish(peer, topic, cdr):
     return peer.do("publish", topic=topic, data=base64.b64encode(cdr).decode())
 
 
-def picture(number):
+def image(number):
     pixels = np.full(SIZE, number, np.uint8)
     return message_type(IMAGE)(header(number, ""), 1, SIZE, "mono8", 0, SIZE, pixels)
 
@@ -99,26 +99,26 @@ def peer():
 
 
 @pytest.mark.parametrize("latched", [False, True])
-def test_large_reliable_messages_wait_for_nobody_who_stands_still(world, peer, latched):
+def test_large_reliable_messages_do_not_wait_for_a_stalled_reader(world, peer, latched):
     topic = "/atlas" if latched else "/pictures"
     sizes = queue.Queue()
-    peer.hear = lambda told: sizes.put(told["size"])
-    world.hear(peer, topic, IMAGE, latched=latched)
-    publisher = world.atlas if latched else world.pictures
-    world.do(lambda: publisher.publish(picture(0)))
+    peer.on_message = lambda report: sizes.put(report["size"])
+    world.subscribe(peer, topic, IMAGE, latched=latched)
+    publisher = world.atlas if latched else world.images
+    world.do(lambda: publisher.publish(image(0)))
     assert sizes.get(timeout=60.0) >= SIZE
     world.goes_on()
     peer.stop()
     for number in range(COUNT):
-        world.do(lambda n=number: publisher.publish(picture(n)))
+        world.do(lambda n=number: publisher.publish(image(n)))
     assert world.goes_on()
     assert world.has_subscribers(topic)  # an engine that waits does so until it is taken for gone
     peer.go_on()
-    assert sizes.get(timeout=60.0) >= SIZE  # it still hears, of what was kept
+    assert sizes.get(timeout=60.0) >= SIZE  # it still receives, of what was queued
 
 
 @pytest.mark.parametrize("kind", [b"\0\3", b"\0\7", b"\0\x7f", b"\1\2"])
-def test_encodings_that_ros2_has_not_harm_nobody(world, peer, kind):
+def test_encodings_that_ros2_has_not_do_no_harm(world, peer, kind):
     """Parameter lists, XCDR2, and what there is not at all."""
     assert peer.do("advertise", topic="/in", type=STRING, latched=False, wait=True)
     before = len(world.seen)
@@ -166,7 +166,7 @@ def test_names_that_ros2_has_not_are_passed_over(world, peer, dds_topic, type_na
     assert world.goes_on()
 
 
-def test_noise_on_its_ports_harms_nobody(world):
+def test_noise_on_its_ports_does_no_harm(world):
     noise = random.Random(9)
     first = 7400 + 250 * DOMAIN
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -177,14 +177,14 @@ def test_noise_on_its_ports_harms_nobody(world):
     assert world.goes_on()
 
 
-def test_who_vanishes_while_it_is_told_much_is_missed_by_nobody(world):
+def test_a_subscriber_that_vanishes_amid_large_messages_delays_no_other(world):
     peer = take_peer()
-    world.hear(peer, "/pictures", IMAGE)
+    world.subscribe(peer, "/pictures", IMAGE)
     for number in range(5):
-        world.do(lambda n=number: world.pictures.publish(picture(n)))
+        world.do(lambda n=number: world.images.publish(image(n)))
     peer.kill()
     for number in range(5):
-        world.do(lambda n=number: world.pictures.publish(picture(n)))
+        world.do(lambda n=number: world.images.publish(image(n)))
     assert world.goes_on()
     until(lambda: not world.has_subscribers("/pictures"))
     assert world.goes_on()

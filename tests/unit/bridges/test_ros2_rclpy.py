@@ -78,7 +78,7 @@ def test_types_within_are_looked_for_too():
         types._compare(SCAN, theirs)
 
 
-def test_publishers_of_others_are_told_of():
+def test_publishers_of_others_are_described():
     info = SimpleNamespace(
         topic_type=SCAN,
         topic_type_hash=HASH,
@@ -106,7 +106,7 @@ def test_without_a_sourced_ros2_that_is_said():
         open_link("rclpy://7", "x")
 
 
-def test_ways_into_a_ros2_graph():
+def test_addresses_of_a_ros2_graph():
     assert _ros2_terms("rclpy") == Ros2Environment("rclpy")
     assert _ros2_terms("rclpy://7") == Ros2Environment("rclpy", 7)
     assert _ros2_terms("ros2://7?interface=lo") == Ros2Environment("dds", 7, ("lo",))

@@ -102,7 +102,7 @@ def test_tokens_are_read_with_defaults_left_out():
         "x" * 999,
     ],
 )
-def test_tokens_of_nobody_are_passed_over(token):
+def test_tokens_of_no_entity_are_passed_over(token):
     assert read_token(token) is None
 
 
@@ -156,14 +156,14 @@ def other(world, router):
     made.close()
 
 
-def test_messages_go_both_ways(world, other):
+def test_messages_go_in_both_directions(world, other):
     chatter = world.graph.advertise("/chatter", STRING)
     seen = []
     world.do(lambda: world.graph.subscribe("/in", seen.append, STRING))
-    heard = other.hear("/chatter", STRING)
+    received = other.subscribe("/chatter", STRING)
     until(lambda: {t.name: t for t in world.graph.topics()}["/chatter"].subscribers)
     world.do(lambda: chatter.publish(String("out")))
-    assert heard.get(timeout=60.0).data == "out"
+    assert received.get(timeout=60.0).data == "out"
     _, publish = other.speak("/in", STRING)
 
     def arrives():
@@ -179,10 +179,10 @@ def test_what_is_latched_awaits_late_subscribers(world, other):
     latched = world.graph.advertise("/map", STRING, latched=True)
     world.do(lambda: latched.publish(String("kept")))
     until(lambda: any(p.topic == "/map" for p in other.participant.publishers()))
-    assert other.hear("/map", STRING, Profile(latched=True)).get(timeout=60.0).data == "kept"
+    assert other.subscribe("/map", STRING, Profile(latched=True)).get(timeout=60.0).data == "kept"
 
 
-def test_services_go_both_ways(world, other):
+def test_services_go_in_both_directions(world, other):
     world.graph.create_service("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
     assert other.call("/ours", TRIGGER).message == "ours"
     spec = ServiceSpec(other.node, "/theirs", TRIGGER)
@@ -190,10 +190,10 @@ def test_services_go_both_ways(world, other):
     server = other.participant.server(spec, lambda _data, reply: reply(answer))
     assert call(world, "/theirs").get(timeout=60.0).message == "theirs"
     server.close()
-    heard = threading.Event()
-    silent = other.participant.server(spec, lambda _data, _reply: heard.set())
+    called = threading.Event()
+    silent = other.participant.server(spec, lambda _data, _reply: called.set())
     asked = call(world, "/theirs")
-    assert heard.wait(60.0)
+    assert called.wait(60.0)
     silent.close()
     assert isinstance(asked.get(timeout=60.0), GraphError)
 

@@ -170,7 +170,7 @@ def test_frames_come_whole_byte_by_byte(wanted):
 @settings(max_examples=300)
 @given(st.lists(st.binary(max_size=400), max_size=20))
 def test_noise_is_frames_or_an_error(pieces):
-    parser = RosTcpFrameParser(most_payload=1000, most_destination=100)
+    parser = RosTcpFrameParser(max_payload=1000, max_destination=100)
     with contextlib.suppress(BridgeError):
         for piece in pieces:
             for frame in parser.feed(piece):
@@ -203,7 +203,7 @@ def test_frames_over_the_limits_are_refused(data, words):
 
 
 def test_frames_at_the_limits_pass():
-    parser = RosTcpFrameParser(most_payload=100_000)
+    parser = RosTcpFrameParser(max_payload=100_000)
     (frame,) = parser.feed(ros_tcp.frame("d" * 4096, bytes(100_000)))
     assert (len(frame.destination), len(frame.payload)) == (4096, 100_000)
 

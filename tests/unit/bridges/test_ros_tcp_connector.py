@@ -47,7 +47,7 @@ def there():
 
 @pytest.fixture
 def port(hold_port):
-    """A port that is the test's own, with nobody there yet."""
+    """A port that is the test's own, without a server yet."""
     return hold_port()
 
 
@@ -240,7 +240,7 @@ def test_large_messages_cross(here, there):
 
 
 class PlainEndpoint:
-    """An endpoint that says what the test says, and keeps what it is told."""
+    """An endpoint that sends what the test sends, and stores what it receives."""
 
     def __init__(self, *greeting):
         self.server = socket.create_server(("127.0.0.1", 0))

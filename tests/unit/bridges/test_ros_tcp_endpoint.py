@@ -90,7 +90,7 @@ def test_the_handshake_says_which_ros(serve, generation):
 
 
 @pytest.mark.parametrize(("generation", "ending"), [("ros1", b""), ("ros2", b"\0")])
-def test_messages_go_both_ways(loop, serve, connect, generation, ending):
+def test_messages_go_in_both_directions(loop, serve, connect, generation, ending):
     client, of = connect(serve(generation=generation).port), string_of[generation]
     seen = collect(loop, "/in")
     client.command("publish", ending, topic="/in", message_name="std_msgs/String", queue_size=10)
@@ -281,7 +281,7 @@ def test_a_broken_answer_fails_the_caller(loop, client):
     assert "invalid" in str(caller.failures[0])
 
 
-def test_callers_of_a_client_who_leaves_do_not_wait(loop, client):
+def test_callers_of_a_client_that_leaves_do_not_wait(loop, client):
     client.command("unity_service", topic="/unity", message_name="std_srvs/Trigger")
     client.synchronize()
     caller = Caller(loop, "/unity")
@@ -339,7 +339,7 @@ def test_one_clients_service_for_another(loop, serve, connect):
         ("\ud7ff" * 1300, b"", "Not registered"),
     ],
 )
-def test_mistakes_are_told_and_forgiven(loop, client, destination, payload, words):
+def test_mistakes_are_reported_and_forgiven(loop, client, destination, payload, words):
     loop.graph.advertise("/taken", STRING)
     loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, ""))
     client.command("publish", topic="/in", message_name="std_msgs/String")
@@ -349,7 +349,7 @@ def test_mistakes_are_told_and_forgiven(loop, client, destination, payload, word
     assert client.next()[0] == "__topic_list"
 
 
-def test_an_unknown_response_harms_nobody(serve, connect):
+def test_an_unknown_response_does_no_harm(serve, connect):
     port = serve().port
     one, two = connect(port), connect(port)
     one.command("response", srv_id=5)
@@ -359,7 +359,7 @@ def test_an_unknown_response_harms_nobody(serve, connect):
 
 
 def test_a_frame_over_the_limit_ends_the_connection_with_a_reason(loop, serve, connect):
-    port = serve(most_payload_bytes=1 << 20).port
+    port = serve(max_payload_bytes=1 << 20).port
     client, other = connect(port), connect(port)
     client.sock.sendall(struct.pack("<I", 3) + b"/in" + struct.pack("<I", 1 << 30))
     assert "1073741824 bytes" in client.next_error()
@@ -386,7 +386,7 @@ def image(size):
 
 
 @pytest.mark.parametrize("generation", ["ros1", "ros2"])
-def test_eight_megabytes_go_both_ways(loop, serve, connect, generation):
+def test_eight_megabytes_go_in_both_directions(loop, serve, connect, generation):
     client = connect(serve(generation=generation).port)
     seen = collect(loop, "/in", "sensor_msgs/msg/Image")
     client.command("subscribe", topic="/out", message_name="sensor_msgs/Image")
@@ -401,7 +401,7 @@ def test_eight_megabytes_go_both_ways(loop, serve, connect, generation):
     assert np.array_equal(seen[0].message.data, sent.data)
 
 
-def test_who_does_not_read_loses_and_others_do_not(loop, serve, connect):
+def test_a_client_that_does_not_read_loses_and_others_do_not(loop, serve, connect):
     port = serve(depth=3).port
     slow = connect(port, reading=False, receive_buffer=4096)
     quick = connect(port)
@@ -426,7 +426,7 @@ def test_who_does_not_read_loses_and_others_do_not(loop, serve, connect):
 
 
 def test_answers_overtake_a_flood(loop, serve, connect):
-    """A client gets its answer after the frame under way, however much waits."""
+    """A client gets its answer after the frame in transit, however much waits."""
     client = connect(serve(depth=1000).port)
     client.command("subscribe", topic="/out", message_name="std_msgs/String")
     client.synchronize()
@@ -447,14 +447,14 @@ def test_answers_overtake_a_flood(loop, serve, connect):
         thread.join()
 
 
-def test_errors_nobody_reads_do_not_pile_up(loop, serve, connect):
+def test_errors_that_no_client_reads_do_not_pile_up(loop, serve, connect):
     port = serve().port
     client, other = connect(port, reading=False, receive_buffer=4096), connect(port)
     client.sock.setblocking(False)
     wrong = frame("/unknown", b"") * 1000
 
     def takes_more():
-        """Whether the socket takes more by the time at which somebody else was served often."""
+        """Returns whether the socket takes more while the other client is served often."""
         for _ in range(50):
             if select.select([], [client.sock], [], 0.0)[1]:
                 return True
@@ -546,8 +546,8 @@ def test_thousands_of_topics(loop, client):
     assert len(info.queues) == 3000
 
 
-def test_too_many_clients_are_told(serve, connect):
-    port = serve(most_clients=1).port
+def test_too_many_clients_are_refused(serve, connect):
+    port = serve(max_clients=1).port
     connect(port)
     late = connect(port)
     assert "too many" in late.next_error()
@@ -573,7 +573,7 @@ def test_only_known_generations():
         RosTcpEndpoint(generation="ros3")
 
 
-def test_closing_lets_everybody_go(loop):
+def test_closing_disconnects_all_clients(loop):
     bridge = RosTcpEndpoint(port=0)
     with BridgeHost(loop.gateway) as bridges:
         bridges.open(bridge)
@@ -611,7 +611,7 @@ def test_a_flood_of_one_client_delays_no_other(loop, serve, connect):
     thread = threading.Thread(target=flood)
     thread.start()
     try:
-        for _ in range(30):  # the flood itself never ends: who had to wait for that would fail
+        for _ in range(30):  # the flood never ends: a client that waited for its end would fail
             other.synchronize()
     finally:
         stop.set()

@@ -154,7 +154,7 @@ def test_no_endpoint_breaks_the_connector(generation, script):
     assert bench.counts() == bench.before
 
 
-def test_a_message_that_cannot_be_said_is_told_once():
+def test_a_message_that_cannot_be_encoded_is_reported_once():
     bench = Bench()
     session = EndpointSession(bench.gateway, "c", "ros1", 10, lambda: None)
     for one in RosTcpFrameParser().feed(
@@ -259,7 +259,7 @@ def test_a_large_message_that_does_not_fit_is_refused():
 
 
 def test_a_queue_without_end_loses_nothing_or_says_so(monkeypatch):
-    monkeypatch.setattr("volery.graph.subscription_queue.MOST_DEPTH", 100)
+    monkeypatch.setattr("volery.graph.subscription_queue.MAX_DEPTH", 100)
     bench = Bench()
     session = EndpointSession(bench.gateway, "c", "ros1", 2, lambda: None)
     subscribe(session, "/out", queue_size=0)

@@ -1,4 +1,4 @@
-"""What clients are told about the graph."""
+"""What clients learn about the graph."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_parameters_of_nodes_are_listed_as_ros_does_and_found_by_either_name(gen
         assert ask("get_param", name=name)["value"] == "null"
 
 
-def test_a_refusal_is_told_in_ros_1_too_whose_response_has_no_word_for_it(ask_as_ros1):
+def test_a_refusal_is_an_error_in_ros_1_too_although_its_response_has_no_field_for_it(ask_as_ros1):
     Flier(ask_as_ros1.bench.graph, namespace="/uav1")
     assert ask_as_ros1("set_param", name="/uav1/flier/height_m", value="2") == {}
     assert "read-only" in ask_as_ros1("set_param", name="/uav1/flier/route", value="[]")

@@ -66,7 +66,7 @@ def test_its_own_thread_cannot_wait_for_an_answer(loop, client):
     assert "give a type: the client's own thread cannot wait" in said.get(timeout=60.0)
 
 
-def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client):
+def test_closing_it_in_its_own_thread_does_not_wait_for_itself(loop, client):
     left = threading.Event()
 
     def wake():

@@ -53,7 +53,7 @@ def test_a_service_is_called_by_the_type_that_the_server_names(state):
 
 
 @pytest.mark.parametrize("name", ["no type", "/", "a/b/c/d"])
-def test_who_waits_for_the_type_of_a_topic_is_told_of_nonsense(state, name):
+def test_a_request_for_the_type_of_a_topic_fails_on_an_invalid_name(state, name):
     found = Future()
     state.ask_rosapi("topic_type", {"topic": "/a"}, found)
     respond(state, *ordered(state), {"type": name})

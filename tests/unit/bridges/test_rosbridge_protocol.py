@@ -13,7 +13,7 @@ from rosbridge_bench import SET_BOOL, STEPS, STRING, TIME_NS, TRIGGER, Bench, tr
 
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.fragments import split
-from volery.bridges.rosbridge.protocol import MOST_WAITING_BYTES
+from volery.bridges.rosbridge.protocol import MAX_WAITING_BYTES
 from volery.bridges.rosbridge.wire import encode_png
 from volery.graph.messages import String, Twist, message_type
 
@@ -90,7 +90,7 @@ def test_reliable_subscriptions_lose_nothing(bench, client):
 
 
 def test_reliable_subscriptions_end_with_an_error_where_they_must(bench, client, monkeypatch):
-    monkeypatch.setattr("volery.graph.subscription_queue.MOST_DEPTH", 100)
+    monkeypatch.setattr("volery.graph.subscription_queue.MAX_DEPTH", 100)
     client.send("subscribe", topic="/out", type=STRING, qos={"reliability": "reliable"})
     publish(bench, *map(str, range(500)))
     (status,) = client.read()
@@ -192,7 +192,7 @@ def test_subscriptions_of_one_topic_share_a_stream(bench, client):
     assert client.read() == []
 
 
-def test_latched_messages_reach_the_late_and_those_who_ask_again(bench, client):
+def test_latched_messages_reach_late_and_repeated_subscriptions(bench, client):
     publish(bench, "map", latched=True)
     client.send("subscribe", topic="/out", id="a")
     assert client.data() == ["map"]
@@ -245,7 +245,7 @@ def test_a_client_that_does_not_read_keeps_the_newest(bench, client):
     assert client.data() == ["997", "998", "999"]
 
 
-def test_fragments_and_pictures_both_ways(bench, client):
+def test_fragments_and_images_in_both_directions(bench, client):
     text = json.dumps({"op": "subscribe", "topic": "/out", "type": STRING, "fragment_size": 20})
     for part in split(text, 11, "f"):
         client.send_raw(part)
@@ -352,7 +352,7 @@ def test_actions_between_clients(bench, client):
     assert "no open goal" in client.read()[0]["msg"]
 
 
-def test_goals_whose_server_leaves_are_aborted(bench, client):
+def test_goals_are_aborted_when_their_server_leaves(bench, client):
     server = bench.peer("server")
     server.send("advertise_action", action="/step", type=STEPS)
     client.send("send_action_goal", id="g", action="/step", action_type=STEPS)
@@ -472,7 +472,7 @@ def test_the_token_comes_first():
         assert friend.read() == []
 
 
-def test_who_leaves_takes_everything_along(bench, client):
+def test_a_client_that_leaves_takes_everything_along(bench, client):
     client.send("advertise", topic="/a", type=STRING)
     client.send("subscribe", topic="/a")
     client.send("advertise_service", service="/do", type=TRIGGER)
@@ -484,15 +484,15 @@ def test_who_leaves_takes_everything_along(bench, client):
     assert bench.gateway.sessions() == []
 
 
-def test_answers_that_nobody_reads_stop_the_reading(client):
+def test_unread_responses_stop_the_reading(client):
     while not client.peer.congested:
         client.send("bogus", id="x" * 900)
-    assert len(client.frames()) * 1000 >= MOST_WAITING_BYTES * 0.5
+    assert len(client.frames()) * 1000 >= MAX_WAITING_BYTES * 0.5
     assert not client.peer.congested
 
 
 def test_messages_beyond_the_limit():
-    client = Bench(most_bytes=1000).peer()
+    client = Bench(max_bytes=1000).peer()
     client.send("publish", topic="/x", msg={"data": "x" * 1000})
     assert "more than 1000 bytes" in client.read()[0]["msg"]
 

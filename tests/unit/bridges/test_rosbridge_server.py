@@ -92,7 +92,7 @@ def image(size):
     return m.message_type(IMAGE)(header, 1, size, "mono8", 0, size, np.zeros(size, np.uint8))
 
 
-def test_topics_both_ways(simulation, server):
+def test_topics_in_both_directions(simulation, server):
     with Plain(server) as client:
         seen = []
         simulation.graph.subscribe("/in", seen.append, STRING)
@@ -133,7 +133,7 @@ def test_late_joiners_get_what_is_latched(simulation, server):
         assert client.read()["msg"] == {"data": "here"}
 
 
-def test_services_both_ways(simulation, server):
+def test_services_in_both_directions(simulation, server):
     response = m.message_type(f"{SET_BOOL}_Response")
     simulation.graph.create_service(
         "/arm", SET_BOOL, lambda request: response(request.data, "armed")
@@ -151,7 +151,7 @@ def test_services_both_ways(simulation, server):
 
 
 @pytest.mark.parametrize("compression", ["none", "cbor", "cbor-raw"])
-def test_eight_megabytes_both_ways(simulation, server, compression):
+def test_eight_megabytes_in_both_directions(simulation, server, compression):
     with Plain(server) as client:
         client.send("subscribe", topic="/image", type=IMAGE, compression=compression)
         client.synchronize()
@@ -167,7 +167,7 @@ def test_eight_megabytes_both_ways(simulation, server, compression):
         assert seen[0].message.data.shape == (8_000_000,)
 
 
-def test_a_client_that_does_not_read_disturbs_nobody(simulation, server):
+def test_a_client_that_does_not_read_disturbs_no_other(simulation, server):
     with Plain(server, close_timeout=0.1) as sleeper, Plain(server) as reader:
         wanted = {"topic": "/image", "type": IMAGE, "compression": "cbor", "queue_length": 2}
         sleeper.send("subscribe", **wanted)
@@ -204,7 +204,7 @@ def test_throttled_streams(simulation, server):
         assert client.read()["id"] == "sync"  # and nothing more came
 
 
-def test_unknown_types_are_told(server):
+def test_unknown_types_are_reported(server):
     with Plain(server) as client:
         client.send("subscribe", topic="/x", type="no_pkg/Nothing", id="s")
         status = client.read()
@@ -212,7 +212,7 @@ def test_unknown_types_are_told(server):
         assert "no_pkg/msg/Nothing" in status["msg"]
 
 
-def test_who_leaves_is_forgotten(simulation, server):
+def test_a_client_that_leaves_is_forgotten(simulation, server):
     with Plain(server) as client:
         client.send("advertise_service", service="/do", type=TRIGGER)
         client.synchronize()
@@ -234,7 +234,7 @@ def test_who_leaves_is_forgotten(simulation, server):
         ({"Origin": "null"}, False),
     ],
 )
-def test_whose_pages_are_let_in(bridges, headers, welcome):
+def test_which_origins_are_accepted(bridges, headers, welcome):
     server = RosbridgeServer(port=0, origins=["https://listed.example"])
     bridges.open(server)
     if welcome:
@@ -336,7 +336,7 @@ def test_bridges_that_cannot_open(bridges, server):
         bridges.open(RosbridgeServer("0.0.0.0", 0, anywhere=True))
 
 
-def test_broken_frames_end_nobody(server):
+def test_broken_frames_end_no_connection(server):
     with Plain(server) as client, Plain(server) as other:
         for frame in ("", "[" * 50_000, b"\xff" * 100, '{"op": []}', "\ud7ff"):
             client.socket.send(frame)
@@ -446,7 +446,7 @@ def test_it_comes_back_and_announces_everything_again(simulation, bridges, hold_
         client.publish("/in", m.String(""))
 
 
-def test_nobody_answers():
+def test_no_server_answers():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -556,7 +556,7 @@ def test_roslibpy_as_a_ros1_client(simulation, bridges):
 
 
 def _roslib_folder():
-    """Folder whose node_modules hold npm's roslib and ws; None where there is none."""
+    """Returns the folder whose node_modules hold npm's roslib and ws; None where there is none."""
     named = os.environ.get("VOLERY_ROSLIB")
     folders = [Path(named)] if named else [Path("/tmp/roslibjs")]
     return next((f for f in folders if (f / "node_modules/roslib").is_dir()), None)
@@ -642,9 +642,9 @@ def test_the_tf_client_of_roslibpy(simulation, server):
         done.set()
         flying.join()
         ros.close()
-    places = [transform["translation"]["x"] for transform in seen]
-    assert places == sorted(places)
-    assert all(abs(x % 1.0 - 0.5) < 1e-9 for x in places)  # half a metre behind, turned about
+    positions = [transform["translation"]["x"] for transform in seen]
+    assert positions == sorted(positions)
+    assert all(abs(x % 1.0 - 0.5) < 1e-9 for x in positions)  # half a metre behind, turned about
     assert abs(seen[0]["rotation"]["z"]) == pytest.approx(1.0)
 
 

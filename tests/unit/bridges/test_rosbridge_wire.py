@@ -1,4 +1,4 @@
-"""CBOR, JSON, pictures and fragments: golden forms from independent coders."""
+"""CBOR, JSON, images and fragments: golden forms from independent coders."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from volery.bridges.rosbridge.cbor_codec import decode_cbor, encode_cbor
-from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, MOST_OPEN, Assembly, split
+from volery.bridges.rosbridge.fragments import MAX_FRAGMENTS, MAX_OPEN, Assembly, split
 from volery.bridges.rosbridge.message_encoder import MessageEncoder
 from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError
@@ -141,7 +141,7 @@ def test_json_of_what_came_as_cbor():
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 30, 1000, 100_001])
-def test_pictures(length):
+def test_images(length):
     text = encode_json({"op": "x", "t": "é" * length})
     operation = json.loads(encode_png(text))
     assert operation["op"] == "png"
@@ -163,14 +163,14 @@ def bomb(size):
         5,
         "",
         "%%%",
-        base64.b64encode(b"no picture").decode(),
+        base64.b64encode(b"no image").decode(),
         base64.b64encode(b"\x89PNG\r\n\x1a\nshort").decode(),
         bomb(2000),
         json.loads(encode_png(encode_png('{"op":"x"}')))["data"],
         json.loads(encode_png("no json"))["data"],
     ],
 )
-def test_pictures_that_are_refused(data):
+def test_images_that_are_refused(data):
     with pytest.raises(BridgeError):
         decode_png({"op": "png", "data": data}, 1_000_000)
 
@@ -189,7 +189,7 @@ def test_fragments_in_any_order():
 def test_fragments_are_bounded():
     assembly = Assembly(10_000)
     one = {"op": "fragment", "id": "a", "data": "x", "num": 0, "total": 2}
-    for k in range(MOST_OPEN):
+    for k in range(MAX_OPEN):
         assembly.add(one | {"id": k}, 0.0)
     with pytest.raises(BridgeError, match="are incomplete"):
         assembly.add(one, 0.0)
@@ -198,7 +198,7 @@ def test_fragments_are_bounded():
     with pytest.raises(BridgeError, match="bytes"):
         assembly.add(one | {"id": "b", "data": "x" * 20_000}, 31.0)
     with pytest.raises(BridgeError, match="of one message"):
-        assembly.add(one | {"id": "b", "total": MOST_FRAGMENTS + 1}, 31.0)
+        assembly.add(one | {"id": "b", "total": MAX_FRAGMENTS + 1}, 31.0)
     with pytest.raises(BridgeError, match="differs"):
         assembly.add(one | {"total": 3}, 31.0)
     assert assembly.waiting == 0
@@ -228,8 +228,8 @@ def test_a_scan_in_all_forms():
     assert text["topic"] == "/scan"
     assert text["msg"]["ranges"] == [1.5, None, None]
     assert text["msg"]["header"] == {"stamp": {"sec": 3, "nanosec": 4}, "frame_id": "laser"}
-    picture = json.loads(forms.frame(published, "png", "/scan"))
-    assert decode_png(picture, 10_000) == text
+    encoded = json.loads(forms.frame(published, "png", "/scan"))
+    assert decode_png(encoded, 10_000) == text
     plain = cbor2.loads(forms.frame(published, "cbor", "/scan"), tag_hook=lambda tag, _: tag)
     ranges = plain["msg"]["ranges"]
     assert (ranges.tag, struct.unpack("<3f", ranges.value)[:2]) == (85, (1.5, math.inf))

@@ -113,9 +113,9 @@ def test_however_a_stream_is_cut_the_frames_are_the_same(sent, data) -> None:
 
 
 @given(st.binary(max_size=400), st.lists(st.integers(0, 400), max_size=6))
-def test_random_bytes_are_never_fatal(data: bytes, places: list[int]) -> None:
-    for place in places:
-        data = data[:place] + SYNC + data[place:]
+def test_random_bytes_are_never_fatal(data: bytes, offsets: list[int]) -> None:
+    for offset in offsets:
+        data = data[:offset] + SYNC + data[offset:]
     found, parser = parse(data)
     assert found == []
     assert parser.noise_bytes == len(data)
@@ -156,7 +156,7 @@ def test_every_single_bit_flipped_is_noticed() -> None:
         assert parse(bytes(broken) + encoded(second))[0] == [second]
 
 
-def test_a_damaged_length_keeps_nobody_waiting() -> None:
+def test_a_damaged_length_delays_no_frame() -> None:
     broken = bytearray(encode_frame(SensorLinkKind.SONAR, 1, 7, 0, b"x"))
     broken[10] |= 0x0F  # almost a megabyte
     parser = SensorLinkParser()
@@ -173,7 +173,7 @@ def test_a_frame_cut_short_is_given_up_when_the_next_ones_fill_it() -> None:
     assert parser.corrupt == 1
 
 
-def test_frames_of_another_version_are_dropped_and_told() -> None:
+def test_frames_of_another_version_are_dropped_and_counted() -> None:
     frame = bytearray(encode_frame(SensorLinkKind.SONAR, 1, 7, 0, b"x"))
     frame[4] = 9
     frame[24:26] = slow_crc(frame[4:24]).to_bytes(2, "little")

@@ -120,7 +120,7 @@ def collect(loop, topic, msgtype=m.PoseStamped):
 
 def test_every_client_gets_what_the_sensors_measure(loop, link, connect):
     publisher = loop.graph.advertise("/uav12/range", m.Range)
-    assert not publisher.has_subscribers  # nobody is there: nothing is asked for
+    assert not publisher.has_subscribers  # without a client nothing is asked for
     clients = [connect(link.port) for _ in range(3)]
     wanted(loop, publisher)
     until(lambda: len(link.clients) == 3)
@@ -172,7 +172,7 @@ def test_poses_go_in(loop, link, connect):
         (SensorLinkKind.SONAR, 2, sonar(), "not accepted here"),
     ],
 )
-def test_what_cannot_be_done_is_told(loop, link, connect, kind, uav, message, words):
+def test_what_cannot_be_done_is_reported(loop, link, connect, kind, uav, message, words):
     loop.graph.advertise("/uav2/odom", m.Odometry)
     client = connect(link.port)
     client.send(kind, uav, message, sequence=77)
@@ -197,7 +197,7 @@ def test_damage_is_counted_and_what_follows_is_taken(loop, link, connect):
     assert (info.received, info.corrupt) == (1, 1)
 
 
-def test_who_speaks_another_version_is_told_once(link, connect):
+def test_a_client_of_another_version_is_notified_once(link, connect):
     client = connect(link.port)
     frame = bytearray(encode_frame(SensorLinkKind.POSE_COMMAND, 2, 0, 0, b""))
     frame[4] = 2
@@ -210,7 +210,7 @@ def test_who_speaks_another_version_is_told_once(link, connect):
     assert link.clients[0].waiting == 0
 
 
-def test_who_sends_too_much_is_told_once_and_may_go_on(loop, link, connect):
+def test_a_client_that_sends_too_much_is_notified_once_and_may_go_on(loop, link, connect):
     loop.graph.advertise("/uav2/odom", m.Odometry)
     commands = collect(loop, "/uav2/pose_command")
     client = connect(link.port)
@@ -222,7 +222,7 @@ def test_who_sends_too_much_is_told_once_and_may_go_on(loop, link, connect):
     assert link.clients[0].waiting == 0
 
 
-def test_who_does_not_read_loses_his_own_oldest_only(loop, link, connect):
+def test_a_client_that_does_not_read_loses_its_own_oldest_only(loop, link, connect):
     publisher = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
     slow, quick = connect(link.port, receive_buffer=4096), connect(link.port)
     wanted(loop, publisher)
@@ -257,7 +257,7 @@ def test_images_have_a_port_of_their_own(loop, link, connect):
     )
 
 
-def test_pictures_that_nobody_reads_delay_no_scan(loop, link, connect):
+def test_unread_images_delay_no_scan(loop, link, connect):
     camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
     laser = loop.graph.advertise("/uav1/laser/horizontal/scan", m.LaserScan)
     sensors, images = connect(link.port), connect(link.image_port, receive_buffer=1 << 16)
@@ -266,7 +266,7 @@ def test_pictures_that_nobody_reads_delay_no_scan(loop, link, connect):
     for k in range(60):
         loop.post(lambda k=k: camera.publish(image(k, 640)))
         loop.publish(laser, scan(k))
-        assert sensors.next().sequence == k  # behind pictures that are not read it would never come
+        assert sensors.next().sequence == k  # behind images that are not read it would never come
     info = next(info for info in link.clients if "images" in info.name)
     assert info.waiting <= 1
     frames = [images.next()]
@@ -377,21 +377,21 @@ def test_two_graphs_joined(loop, link, ros):
 
 def test_a_flight_seen_from_the_ros_side(ros):
     """What comes over the link is what the simulation publishes, byte for byte."""
-    sent, heard = {}, []
+    sent, received = {}, []
     scenario = load_scenario("hover")
     with Simulation(scenario, threads=1) as simulation, BridgeHost(simulation.gateway) as bridges:
         link = SensorLink(port=0, image_port=0)
         bridges.open(link)
-        ros.do(lambda: ros.graph.subscribe_all(heard.append))
+        ros.do(lambda: ros.graph.subscribe_all(received.append))
         ros_bridges, client = joined(ros, link)
         simulation.graph.subscribe_all(lambda p: sent.setdefault((p.topic, p.cdr)))
         with ros_bridges:
             until(lambda: "/uav1/imu" in subscribed(simulation.gateway))
             simulation.run(1.0)
-            until(lambda: {p.topic for p in heard} >= {"/uav1/imu", "/uav1/odom"})
+            until(lambda: {p.topic for p in received} >= {"/uav1/imu", "/uav1/odom"})
         assert client.refused == client.corrupt == 0
-    assert len(heard) > 20
-    assert all((published.topic, published.cdr) in sent for published in heard)
+    assert len(received) > 20
+    assert all((published.topic, published.cdr) in sent for published in received)
 
 
 def test_the_ros_side_joins_again(loop, bridges, ros, hold_port):
@@ -412,6 +412,6 @@ def test_the_ros_side_joins_again(loop, bridges, ros, hold_port):
         until(lambda: seen)
 
 
-def test_nobody_listens(ros):
+def test_no_server_listens(ros):
     with BridgeHost(ros.gateway) as bridges, pytest.raises(BridgeError, match="no server on"):
         bridges.open(SensorLinkClient(port=1))

@@ -92,7 +92,7 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
         ("\x00\xff", "line 5: 1 column where"),
     ],
 )
-def test_lines_that_cannot_be_read_are_left_out_and_told(tmp_path, line, problem):
+def test_lines_that_cannot_be_read_are_left_out_and_reported(tmp_path, line, problem):
     scans = walk(tmp_path, f"{LINES}{line}\n1300000 0 0 0 1000 2000 3000\n")
     assert [one.time_ns for one in scans][-1] == 1_300_000_000
     assert (scans.scans, scans.left_out) == (3, 1)
@@ -119,10 +119,10 @@ def test_the_command_writes_a_log(tmp_path, kind):
     source, layout, out = tmp_path / "a.txt", tmp_path / "a.toml", tmp_path / f"out{kind}"
     source.write_text("".join(f"{k * 25_000} 100 200 300 0\n" for k in range(50)) + "broken\n")
     layout.write_text(TOML)
-    told = convert(source, out, "--layout", layout)
-    assert told.exit_code == 0, told.output
-    assert "50 scans, 51 messages" in told.output
-    assert "1 line left out; line 51: 1 column where" in told.output
+    result = convert(source, out, "--layout", layout)
+    assert result.exit_code == 0, result.output
+    assert "50 scans, 51 messages" in result.output
+    assert "1 line left out; line 51: 1 column where" in result.output
     walked, decoder = LogWalk(out), LogDecoder()
     scans = [decoder.decode(one).message for one in walked if one.topic.topic.endswith("/scan")]
     assert len(scans) == 50
@@ -131,17 +131,17 @@ def test_the_command_writes_a_log(tmp_path, kind):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.toml", "a.txt", f"out{kind}"]
 
 
-def test_what_is_wrong_is_told_in_a_line(tmp_path):
+def test_what_is_wrong_is_reported_in_a_line(tmp_path):
     source, layout = tmp_path / "a.txt", tmp_path / "a.toml"
     source.write_text("1 2 3\n")
     layout.write_text(TOML.replace("beams", "beam"))
-    told = convert(source, tmp_path / "out.mcap", "--layout", layout)
-    assert told.exit_code == 2
-    assert "did you mean 'beams'" in told.output
+    result = convert(source, tmp_path / "out.mcap", "--layout", layout)
+    assert result.exit_code == 2
+    assert "did you mean 'beams'" in result.output
     layout.write_text(TOML)
-    told = convert(source, tmp_path / "out.mcap", "--layout", layout)
-    assert told.exit_code == 2
-    assert "3 columns where the layout needs 5" in told.output
+    result = convert(source, tmp_path / "out.mcap", "--layout", layout)
+    assert result.exit_code == 2
+    assert "3 columns where the layout needs 5" in result.output
     assert convert(source, tmp_path / "out.txt", "--layout", layout).exit_code == 2
     assert convert(tmp_path / "none", tmp_path / "out.mcap", "--layout", layout).exit_code == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.toml", "a.txt"]
@@ -164,11 +164,11 @@ def test_wheels_make_a_pose(tmp_path):
     rows = [(500.0, 200.0), (500.0 - 0.5 * quarter, 200.0 + 0.5 * quarter)]
     rows.append((rows[1][0] + 1000.0, rows[1][1] + 1000.0))
     text = "".join(f"{k + 1}00000 {a} {b} 0 1 2 3\n" for k, (a, b) in enumerate(rows))
-    told = [p.message for p in walk(tmp_path, text, {**layout, "wheels": wheels})]
-    places = [m.pose.pose for m in told if type(m).__name__.endswith("Odometry")]
-    assert len(places) == 3
+    published = [p.message for p in walk(tmp_path, text, {**layout, "wheels": wheels})]
+    poses = [m.pose.pose for m in published if type(m).__name__.endswith("Odometry")]
+    assert len(poses) == 3
     found = [(p.position.x, p.position.y, 2 * math.atan2(p.orientation.z, p.orientation.w))
-             for p in places]  # fmt: skip
+             for p in poses]  # fmt: skip
     assert found[0] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
     assert found[1] == pytest.approx((0.0, 0.0, 0.5 * math.pi), abs=1e-9)
     assert found[2] == pytest.approx((0.0, 1.0, 0.5 * math.pi), abs=1e-9)
@@ -183,12 +183,12 @@ def test_either_wheels_or_odometry_are_given():
 def test_a_clock_set_back_is_followed_and_disorder_is_not(tmp_path):
     times = (9_000_000, 9_100_000, 9_050_000, 1_000_000, 1_100_000)
     scans = walk(tmp_path, "".join(f"{time} 0 0 0 1 2 3\n" for time in times))
-    heard = [one.time_ns for one in scans if one.topic.endswith("scan")]
-    assert heard == [time * 1000 for time in times if time != 9_050_000]
+    stamps = [one.time_ns for one in scans if one.topic.endswith("scan")]
+    assert stamps == [time * 1000 for time in times if time != 9_050_000]
     assert (scans.left_out, scans.clock_set) == (1, 1)
 
 
-def test_odometry_that_is_no_number_is_not_told(tmp_path):
+def test_odometry_that_is_no_number_is_not_published(tmp_path):
     scans = walk(tmp_path, "1000000 nan 0 0 1 2 3\n")
     assert [one.topic for one in scans] == ["/tf_static", "/uav1/laser/horizontal/scan"]
 

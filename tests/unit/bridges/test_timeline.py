@@ -1,4 +1,4 @@
-"""Any place of a log at once, held against a plain walk from its beginning."""
+"""Any position of a log at once, held against a plain walk from its beginning."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def write(path, entries, chunk_every=7, end=True):
 
 def everything(log):
     line = Timeline(log)
-    place, found, over = TimelinePosition(0, 0), [], False
+    position, found, over = TimelinePosition(0, 0), [], False
     while not over:
-        shown, place, over = line.take(place, 1 << 61, set(log.topics))
+        shown, position, over = line.take(position, 1 << 61, set(log.topics))
         found += shown
     return found
 
@@ -52,7 +52,7 @@ def walked(path):
     return [(r.topic.topic, r.time_ns, r.data, r.sequence) for r in LogWalk(path)]
 
 
-def told(shown):
+def fields_of(shown):
     return [
         (s.record.topic.topic, s.record.time_ns, s.record.data, s.record.sequence) for s in shown
     ]
@@ -88,7 +88,7 @@ def test_the_line_is_that_of_a_walk(tmp_path, suffix, end, entries, chunk_every)
     path = write(tmp_path / f"x{suffix}", entries, chunk_every, end)
     log = open_chunks(path)
     found = everything(log)
-    assert told(found) == walked(path)
+    assert fields_of(found) == walked(path)
     expected = on_the_line([ms * 1_000_000 for _, ms in entries])
     assert [s.time_ns for s in found] == expected
     line = Timeline(log)
@@ -104,17 +104,17 @@ def test_any_time_is_found(tmp_path, suffix, entries, chunk_every, at):
     log = open_chunks(write(tmp_path / f"x{suffix}", entries, chunk_every))
     line, found = Timeline(log), everything(log)
     t = line.start_ns + int((line.end_ns - line.start_ns) * at)
-    place = line.after(t)
+    position = line.after(t)
     later = next((k for k, s in enumerate(found) if s.time_ns > t), len(found))
-    shown = line.take(place, 1 << 61, set(log.topics)).shown
-    assert told(shown[:1]) == told(found[later : later + 1])
+    shown = line.take(position, 1 << 61, set(log.topics)).shown
+    assert fields_of(shown[:1]) == fields_of(found[later : later + 1])
     last = {s.channel: s for s in found[:later]}
-    assert told(line.last_before(place, set(log.topics))) == told(
+    assert fields_of(line.last_before(position, set(log.topics))) == fields_of(
         sorted(last.values(), key=found.index)
     )
     since = t - 250_000_000
     rare = {channel for channel, topic in log.topics.items() if topic.topic == "/rare"}
-    assert told(line.since(place, since, rare)) == told(
+    assert fields_of(line.since(position, since, rare)) == fields_of(
         [s for s in found[:later] if s.channel in rare and s.time_ns > since]
     )
     log.close()
@@ -130,7 +130,7 @@ def test_logs_cut_off_anywhere_are_read_as_far_as_they_go(tmp_path, suffix):
         log = open_chunks(path)
         assert log.problem
         found = everything(log)
-        assert told(found) == walked(path)
+        assert fields_of(found) == walked(path)
         lengths.add(len(found))
         log.close()
     assert len(lengths) > 5
@@ -173,7 +173,7 @@ def test_mcap_files_of_others(tmp_path, compression, chunked, indexed):
     path = tmp_path / "x.mcap"
     path.write_bytes(file.getvalue())
     log = open_chunks(path)
-    assert told(everything(log)) == walked(path)
+    assert fields_of(everything(log)) == walked(path)
     assert sum(log.counts().values()) == 200
     assert not log.problem
     log.close()
@@ -189,7 +189,7 @@ def test_a_bag_of_others(tmp_path):
         for k in range(100):
             writer.write(connection, k * 1000, b"\x01\0\0\0x")
     log = open_chunks(path)
-    assert told(everything(log)) == walked(path)
+    assert fields_of(everything(log)) == walked(path)
     assert len(log.chunks) > 3
     log.close()
 

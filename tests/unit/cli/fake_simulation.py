@@ -34,8 +34,8 @@ class FakeDiagnostics:
         return "ab" * 32
 
 
-def _clearance(points: Any, reach_m: float, include_terrain: bool = True) -> Any:
-    return SimpleNamespace(distance=np.full(len(points), reach_m))
+def _clearance(points: Any, max_range_m: float, include_terrain: bool = True) -> Any:
+    return SimpleNamespace(distance=np.full(len(points), max_range_m))
 
 
 class FakeSimulation:
@@ -80,7 +80,7 @@ class FakeSimulation:
         self, seconds: float | None = None, *, speed: float | None = None, on_progress: Any = None
     ) -> None:
         self.clock.speed = speed
-        start = told = time.perf_counter()
+        start = last_progress = time.perf_counter()
         while self.time_s < self.scenario.duration_s:
             self._publish()
             self.graph.deliver()
@@ -88,8 +88,8 @@ class FakeSimulation:
             if self.wall_s_per_step:
                 time.sleep(self.wall_s_per_step)
             now = time.perf_counter()
-            if on_progress is not None and now - told > 0.05:
-                told = now
+            if on_progress is not None and now - last_progress > 0.05:
+                last_progress = now
                 on_progress(
                     SimpleNamespace(
                         time_s=self.time_s,

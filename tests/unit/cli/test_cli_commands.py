@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from volery.bridges.logs.log_writer import create_log
 from volery.cli import bench, doctor, start
 from volery.cli.app import app
-from volery.cli.error_reporting import guarded, word_logs
+from volery.cli.error_reporting import format_logs, guarded
 from volery.cli.serve import named_problem
 from volery.core.errors import VoleryError
 from volery.core.machine import describe_machine, describe_versions
@@ -49,7 +49,7 @@ def test_every_command_is_explained() -> None:
         assert name in result.stdout
 
 
-def test_a_folder_without_px4_is_told_before_anything_is_built(tmp_path: Path) -> None:
+def test_a_folder_without_px4_is_an_error_before_anything_is_built(tmp_path: Path) -> None:
     for words in (["run", "hover"], ["px4"]):
         result = runner.invoke(app, [*words, "--px4-dir", str(tmp_path)])
         assert result.exit_code == 2
@@ -65,7 +65,7 @@ def test_a_run_that_cannot_last_names_its_option(seconds: str) -> None:
     assert seconds in result.stderr
 
 
-def test_an_interrupt_that_a_library_made_an_error_of_is_told_as_one() -> None:
+def test_an_interrupt_that_a_library_made_an_error_of_is_reported_as_one() -> None:
     def load() -> None:
         try:
             try:
@@ -78,16 +78,16 @@ def test_an_interrupt_that_a_library_made_an_error_of_is_told_as_one() -> None:
     def fail() -> None:
         raise VoleryError("it is not installed")
 
-    told = typer.Typer()
+    commands = typer.Typer()
     for command in (load, fail):
-        told.command()(guarded(command))
-    stopped, failed = (runner.invoke(told, [name]) for name in ("load", "fail"))
+        commands.command()(guarded(command))
+    stopped, failed = (runner.invoke(commands, [name]) for name in ("load", "fail"))
     assert (stopped.exit_code, stopped.stderr) == (130, "stopped\n")
     assert (failed.exit_code, failed.stderr) == (2, "error: it is not installed\n")
 
 
 @pytest.mark.parametrize("words", [["run", "{}"], ["launch", "{}"]])
-def test_a_file_that_cannot_be_read_is_told_without_numbers(
+def test_a_file_that_cannot_be_read_is_reported_without_numbers(
     words: list[str], tmp_path: Path
 ) -> None:
     path = tmp_path / "secret.toml"
@@ -99,16 +99,16 @@ def test_a_file_that_cannot_be_read_is_told_without_numbers(
 
 
 def test_the_options_of_a_run_are_grouped() -> None:
-    told = runner.invoke(app, ["run", "--help"]).stdout
+    output = runner.invoke(app, ["run", "--help"]).stdout
     titles = ("Flight", "Output files", "Bridges and access", "ROS 2", "Autopilots")
     groups = [f"─ {title} ─" for title in titles]
     firsts = ("--uavs", "--record", "--page", "--ros2 ", "--px4-dir")
-    places = [told.index(text) for pair in zip(groups, firsts, strict=True) for text in pair]
-    assert places == sorted(places)
+    positions = [output.index(text) for pair in zip(groups, firsts, strict=True) for text in pair]
+    assert positions == sorted(positions)
 
 
 def test_what_is_logged_looks_like_what_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    word_logs()
+    format_logs()
     assert logging.lastResort is not None
     for level in (logging.WARNING, logging.ERROR):
         logging.lastResort.emit(
@@ -348,6 +348,6 @@ def test_identify_writes_a_model_that_loads(tmp_path: Path) -> None:
 
 
 def test_help_names_all_benches_and_tables_of_profiles() -> None:
-    told = runner.invoke(app, ["bench", "--help"]).output
-    assert [name for name in registry.BENCHES if name not in told] == []
+    output = runner.invoke(app, ["bench", "--help"]).output
+    assert [name for name in registry.BENCHES if name not in output] == []
     assert "[[launch]]" in runner.invoke(app, ["launch", "--help"]).output

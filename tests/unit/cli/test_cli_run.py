@@ -272,7 +272,7 @@ main()
     ("part", "said"),
     [("Lost", ""), ("HalfMade", ""), ("HeldByItself", ""), ("Compiled", "compiled\n")],
 )
-def test_ctrl_c_in_an_awkward_place(part: str, said: str) -> None:
+def test_ctrl_c_at_an_awkward_point(part: str, said: str) -> None:
     """One that Python cannot pass on, two that leave something half made, one that must wait."""
     program = INTERRUPTED_WHILE_BUILT.format(part=part)
     command = [sys.executable, "-c", program, str(Path(__file__).parent), "run", "hover"]

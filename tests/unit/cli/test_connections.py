@@ -12,13 +12,13 @@ def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
     def open_link(via: str, name: str) -> str:
         tries.append(name)
         if len(tries) < 3:
-            raise UnreachableError(f"nobody at {via}")
+            raise UnreachableError(f"no server at {via}")
         return "link"
 
     monkeypatch.setattr(connections, "open_link", open_link)
     monkeypatch.setattr(connections, "_AGAIN_S", 0.0)
     assert connections.await_link("x://y", "node") == "link"
-    assert capsys.readouterr().err == "nobody at x://y; waiting up to 30 s\n"
+    assert capsys.readouterr().err == "no server at x://y; waiting up to 30 s\n"
     tries.clear()
     with pytest.raises(UnreachableError):
         connections.await_link("x://y", "node", timeout_s=0.0)
@@ -31,18 +31,20 @@ def test_what_never_comes_is_not_waited_for(capsys) -> None:
     assert capsys.readouterr().err == ""
 
 
-def test_a_graph_that_goes_and_comes_is_told_once_each(capsys) -> None:
+def test_a_graph_that_goes_and_comes_is_reported_once_each(capsys) -> None:
     class Line:
         connected = True
 
     line = Line()
-    told = connections.ConnectionOptions(line, "x://y")
+    monitor = connections.ConnectionMonitor(line, "x://y")
     for connected in (True, False, False, True, True):
         line.connected = connected
-        assert told() is False
+        assert monitor() is False
     assert capsys.readouterr().err == (
         "the graph at x://y is disconnected; waiting for it\n"
         "the graph at x://y is connected again\n"
     )
-    assert connections.ConnectionOptions(object(), "ros2")() is False  # of which no server tells
+    assert (
+        connections.ConnectionMonitor(object(), "ros2")() is False
+    )  # whose link does not say whether it is connected
     assert capsys.readouterr().err == ""

@@ -1,4 +1,4 @@
-"""The flight behind the first page goes on until somebody takes part."""
+"""The flight behind the first page goes on until a client takes part."""
 
 import pytest
 
@@ -31,30 +31,30 @@ def call(simulation, service, kind):
 
 
 def fly(simulation, seconds):
-    """Flies with looks as those of the server; returns the largest time and the least charge."""
-    first, latest_s, least = FirstFlight(simulation), 0.0, 1.0
+    """Flies with looks as those of the server; returns the largest time and the lowest charge."""
+    first, latest_s, min_charge = FirstFlight(simulation), 0.0, 1.0
     for _ in range(round(seconds / 0.1)):
         simulation.run(0.1)
         first.look()
         simulation.process_commands()
         latest_s = max(latest_s, simulation.time_s)
-        least = min(least, simulation.uavs["uav1"].battery_charge)
-    return latest_s, least
+        min_charge = min(min_charge, simulation.uavs["uav1"].battery_charge)
+    return latest_s, min_charge
 
 
 def test_it_starts_again_before_batteries_are_low(hovering):
-    latest_s, least = fly(hovering, 30.0)
+    latest_s, min_charge = fly(hovering, 30.0)
     assert latest_s < 15.0
-    assert least > RESTART_CHARGE - 0.02
+    assert min_charge > RESTART_CHARGE - 0.02
     assert not [event for event in hovering.diagnostics.events if event.kind == "battery"]
     assert hovering.uavs["uav1"].mode.name == "HOLD"
 
 
 def test_a_flight_of_a_client_is_left_alone(hovering):
     call(hovering, "/uav1/hold", "std_srvs/srv/Trigger")
-    latest_s, least = fly(hovering, 30.0)
+    latest_s, min_charge = fly(hovering, 30.0)
     assert latest_s == pytest.approx(30.0, abs=0.2)
-    assert least < RESTART_CHARGE
+    assert min_charge < RESTART_CHARGE
 
 
 def test_queries_and_the_pace_are_no_part_in_it(hovering):

@@ -55,7 +55,7 @@ class Silent:
     """A graph that cannot say which topics it has, such as that of ROS 1 without rosapi."""
 
     def call(self, service, request, reply):
-        reply.fail(GraphError(f"nobody offers service '{service}'"))
+        reply.fail(GraphError(f"service '{service}' has no server"))
 
 
 def test_a_node_without_its_uav_is_warned_of(capsys):
@@ -64,6 +64,6 @@ def test_a_node_without_its_uav_is_warned_of(capsys):
     assert "no topic below /uav9; its UAVs: uav1, uav2" in capsys.readouterr().err
     for namespace in ("/uav1", "uav2", "/"):
         _check_namespace(graph, namespace)
-    _check_namespace(Topics(), "/uav9")  # it is not told what there is
+    _check_namespace(Topics(), "/uav9")  # without a list of topics
     _check_namespace(Silent(), "/uav9")
     assert capsys.readouterr().err == ""

@@ -83,7 +83,7 @@ def test_keys_steer_a_flight() -> None:
 
 
 class Steered(SimpleNamespace):
-    """Notes what a simulation is told."""
+    """Notes what a simulation receives."""
 
     def pause(self) -> None:
         self.paused = True

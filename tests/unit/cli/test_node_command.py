@@ -10,7 +10,7 @@ GAPS = "gap_following"
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["no_such_module:Node"], "cannot be imported"),
         (["volery.autonomy.avoidance.gap_following:Nobody"], "has no class 'Nobody'"),
@@ -27,24 +27,24 @@ GAPS = "gap_following"
         ([GAPS, "-p", "hieght_m=3"], "has no parameter hieght_m; known: deceleration_m_s2, "),
     ],
 )
-def test_a_command_that_cannot_run_does_not_wait(words, told, monkeypatch):
+def test_a_command_that_cannot_run_does_not_wait(words, message, monkeypatch):
     def wait(*_):
         raise AssertionError("it waits for a graph")
 
     monkeypatch.setattr(node, "await_link", wait)
     result = CliRunner().invoke(app, ["node", *words])
     assert result.exit_code == 2, result.output
-    assert told in result.output
+    assert message in result.output
 
 
 @pytest.mark.parametrize(
-    ("lines", "told"),
+    ("lines", "message"),
     [
         ("parameters = { height_m = 0.0 }", "parameter 'height_m' must be 0.1 or more, not 0.0"),
         ("parameters = { wings = 2 }", "has no parameter wings"),
     ],
 )
-def test_profiles_are_looked_through_before_it_waits(lines, told, monkeypatch, tmp_path):
+def test_profiles_are_looked_through_before_it_waits(lines, message, monkeypatch, tmp_path):
     def wait(*_):
         raise AssertionError("it waits for a graph")
 
@@ -56,4 +56,4 @@ def test_profiles_are_looked_through_before_it_waits(lines, told, monkeypatch, t
     for words in (["node", GAPS, "--profile", str(profile)], ["launch", str(several)]):
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 2, result.output
-        assert told in result.output
+        assert message in result.output

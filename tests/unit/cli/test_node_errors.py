@@ -88,15 +88,15 @@ def fatal_of(log):
 def test_the_users_frames_are_shown_and_recorded(run):
     result, log = run("Broken")
     assert result.exit_code == 2, result.output
-    told = result.output
-    assert "[INFO] [0.000000000] [uav1.broken]: begins" in told
+    output = result.output
+    assert "[INFO] [0.000000000] [uav1.broken]: begins" in output
     assert (
         "error: node /uav1/broken failed at 0.100 s in its timer (on_timer): "
-        "ZeroDivisionError: division by zero (broken_broken.py:17)" in told
+        "ZeroDivisionError: division by zero (broken_broken.py:17)" in output
     )
-    assert 'broken_broken.py", line 14, in on_timer' in told
-    assert 'broken_broken.py", line 17, in helper\n    return 1 / self.divisor' in told
-    assert "/volery/graph/" not in told
+    assert 'broken_broken.py", line 14, in on_timer' in output
+    assert 'broken_broken.py", line 17, in helper\n    return 1 / self.divisor' in output
+    assert "/volery/graph/" not in output
     begun, fatal = fatal_of(log)
     assert (begun.level, begun.msg) == (20, "begins")
     assert (fatal.level, fatal.name, fatal.line) == (50, "uav1.broken", 17)
@@ -106,18 +106,18 @@ def test_the_users_frames_are_shown_and_recorded(run):
 
 
 def test_errors_of_volery_and_of_libraries_point_to_the_users_line_too(run):
-    told = run("Wrong")[0].output
-    assert "carries std_msgs/msg/String, not a str (broken_wrong.py:22)" in told
-    told = run("Deep")[0].output
-    assert "JSONDecodeError" in told
-    assert "(broken_deep.py:27)" in told
-    assert "json/decoder.py" not in told
+    output = run("Wrong")[0].output
+    assert "carries std_msgs/msg/String, not a str (broken_wrong.py:22)" in output
+    output = run("Deep")[0].output
+    assert "JSONDecodeError" in output
+    assert "(broken_deep.py:27)" in output
+    assert "json/decoder.py" not in output
 
 
 def test_traceback_shows_all(run):
-    told = run("Broken", "--traceback")[0].output
-    assert "Traceback (most recent call last)" in told
-    assert "/graph/nodes/node.py" in told
+    output = run("Broken", "--traceback")[0].output
+    assert "Traceback (most recent call last)" in output
+    assert "/graph/nodes/node.py" in output
 
 
 def test_a_constructor_that_fails_shows_its_line(run):

@@ -21,7 +21,7 @@ FILES = ("map.pgm", "map.png", "map.yaml", "path.tum", "summary.json")
 
 @pytest.fixture(scope="module")
 def carried():
-    return Carried(storey(), CORNERS, beams=241, fov_deg=240.0, reach=8.0)
+    return Carried(storey(), CORNERS, beams=241, fov_deg=240.0, max_range_m=8.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +47,11 @@ def mapped(text):
 
 def grid_of(folder):
     """Shades (rows, columns), the lowest row first, origin and width of cells."""
-    told = dict(line.split(": ", 1) for line in (folder / "map.yaml").read_text().splitlines())
-    assert told["mode"] == "trinary"
-    with Image.open(folder / told["image"]) as picture:
-        shades = np.asarray(picture)[::-1]
-    return shades, np.array(json.loads(told["origin"]))[:2], float(told["resolution"])
+    metadata = dict(line.split(": ", 1) for line in (folder / "map.yaml").read_text().splitlines())
+    assert metadata["mode"] == "trinary"
+    with Image.open(folder / metadata["image"]) as image:
+        shades = np.asarray(image)[::-1]
+    return shades, np.array(json.loads(metadata["origin"]))[:2], float(metadata["resolution"])
 
 
 def tum_of(folder):
@@ -68,11 +68,11 @@ def distance_to_walls(points, walls):
 def test_a_text_log_becomes_map_path_and_summary(mapped, carried):
     folder, said = mapped
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
-    told = json.loads((folder / "summary.json").read_text())
-    assert told["mode"] == "planar"
-    assert told["scans"] == len(carried.time_s)
-    assert told["refused"] == 1
-    assert told["way_m"] == pytest.approx(16.0, abs=0.3)
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["mode"] == "planar"
+    assert summary["scans"] == len(carried.time_s)
+    assert summary["refused"] == 1
+    assert summary["way_m"] == pytest.approx(16.0, abs=0.3)
     assert "mapping " in said
     assert "m path length (without IMU)" in said
     assert f"1 line left out; line {len(carried.time_s) + 1}: " in said
@@ -97,8 +97,8 @@ def test_the_map_is_that_of_the_walls(mapped, carried):
     free = shades == 254
     i, j = ((carried.poses[:, :2] - origin) / cell).astype(int).T
     assert free[j, i].mean() > 0.9
-    with Image.open(mapped[0] / "map.png") as picture:
-        assert min(picture.size) > 100
+    with Image.open(mapped[0] / "map.png") as image:
+        assert min(image.size) > 100
 
 
 def test_files_are_replaced_only_if_asked(mapped, text):
@@ -152,15 +152,15 @@ def test_odometry_and_closures_can_be_left_out(text, tmp_path):
     )
     result = slam(text / "scans.txt", *layout, "--out", tmp_path / "out", *more)
     assert result.exit_code == 0, result.output
-    told = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert "/uav1/odom" not in told["topics"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert "/uav1/odom" not in summary["topics"]
     first, last = tum_of(tmp_path / "out")[[0, -1]]
     np.testing.assert_allclose(first[1:4], [10.0, 5.0, 0.0], atol=0.05)
     np.testing.assert_allclose(last[1:3], [10.0, 21.0], atol=0.4)
     assert grid_of(tmp_path / "out")[2] == 0.1
 
 
-def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkeypatch):
+def test_a_folder_that_cannot_be_written_to_is_an_error_before_the_work(text, monkeypatch):
     def work(*_):
         raise AssertionError("it maps already")
 
@@ -174,26 +174,26 @@ def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkey
     assert "is not a folder" in result.output
 
 
-@pytest.mark.parametrize("most", [40_000, 40])
-def test_a_map_that_is_too_large_costs_nothing_else(most, text, tmp_path, monkeypatch):
+@pytest.mark.parametrize("max_cells", [40_000, 40])
+def test_a_map_that_is_too_large_costs_nothing_else(max_cells, text, tmp_path, monkeypatch):
     """Its cells become coarser, and where that does not help the path is written all the same."""
-    monkeypatch.setattr("volery.runtime.replay.slam.map_rendering._MOST_CELLS", most)
+    monkeypatch.setattr("volery.runtime.replay.slam.map_rendering._MAX_CELLS", max_cells)
     out = tmp_path / "out"
     result = slam(text / "scans.txt", "--layout", text / "layout.toml", "--out", out)
     assert result.exit_code == 0, result.output
-    told = json.loads((out / "summary.json").read_text())
-    assert len(tum_of(out)) == told["scans"]
-    if most == 40:
+    summary = json.loads((out / "summary.json").read_text())
+    assert len(tum_of(out)) == summary["scans"]
+    if max_cells == 40:
         assert "warning: no map is written: " in result.output
-        assert told["cell_m"] is None
+        assert summary["cell_m"] is None
         assert sorted(path.name for path in out.iterdir()) == ["path.tum", "summary.json"]
     else:
-        assert f"cells are {told['cell_m']:g} m wide" in result.output
-        assert told["cell_m"] in (0.1, 0.2, 0.4)
-        assert grid_of(out)[2] == told["cell_m"]
+        assert f"cells are {summary['cell_m']:g} m wide" in result.output
+        assert summary["cell_m"] in (0.1, 0.2, 0.4)
+        assert grid_of(out)[2] == summary["cell_m"]
 
 
-def test_a_uav_that_is_not_in_the_log_is_told(text, tmp_path):
+def test_a_uav_that_is_not_in_the_log_is_an_error(text, tmp_path):
     command = (text / "scans.txt", "--layout", text / "layout.toml", "--out", tmp_path / "out")
     result = slam(*command, "--uav", "uav9")
     assert result.exit_code == 2
@@ -203,16 +203,16 @@ def test_a_uav_that_is_not_in_the_log_is_told(text, tmp_path):
 def test_an_imu_that_was_not_used_is_advised_where_the_plane_does_not_do(capsys):
     channels = TopicSelection("uav1", {}, has_imu=False)
     empty = np.zeros(0, np.int64)
-    way = EstimatedTrajectory(empty, empty, np.zeros((0, 3)), np.zeros((0, 4)))
-    outcome = SlamResult(channels, way, [], lambda _: LEVEL, 9, 9.0, 0.1, {})
+    trajectory = EstimatedTrajectory(empty, empty, np.zeros((0, 3)), np.zeros((0, 4)))
+    outcome = SlamResult(channels, trajectory, [], lambda _: LEVEL, 9, 9.0, 0.1, {})
     topics = {"/uav1/imu": "sensor_msgs/msg/Imu"}
     outcome.states.update(tracking=6.0, degraded=3.0)
     _advise(outcome, {})
     assert capsys.readouterr().err == ""
     _advise(outcome, topics)
-    told = capsys.readouterr().err
-    assert told.startswith("warning: degraded or lost for 33% of the time, in the plane")
-    assert "(/uav1/imu) may help: --imu" in told
+    warning = capsys.readouterr().err
+    assert warning.startswith("warning: degraded or lost for 33% of the time, in the plane")
+    assert "(/uav1/imu) may help: --imu" in warning
     outcome.states.update(tracking=60.0)
     _advise(outcome, topics)
     assert capsys.readouterr().err == ""
@@ -225,13 +225,13 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
     path.write_text("\n".join([*lines[:60], *later[60:]]))
     result = slam(path, "--layout", text / "layout.toml", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    told = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert (told["scans"], told["clock_set"], told["refused"]) == (len(lines), 1, 0)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["scans"], summary["clock_set"], summary["refused"]) == (len(lines), 1, 0)
     assert tum_of(tmp_path / "out")[-1, 1] == pytest.approx(16.0, abs=0.3)
 
 
 @pytest.mark.parametrize(
-    ("content", "arguments", "told"),
+    ("content", "arguments", "message"),
     [
         ("", ("--layout", "layout.toml"), "has no scan of this layout"),
         ("", (), "the file is empty"),
@@ -252,7 +252,7 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
         (None, (), "cannot read the log"),
     ],
 )
-def test_what_cannot_be_mapped_is_told_in_a_line(content, arguments, told, text, tmp_path):
+def test_what_cannot_be_mapped_is_reported_in_a_line(content, arguments, message, text, tmp_path):
     path = tmp_path / "scans.txt"
     if content is not None:
         path.write_text(content)
@@ -260,12 +260,12 @@ def test_what_cannot_be_mapped_is_told_in_a_line(content, arguments, told, text,
     arguments = [str(tmp_path / a) if a.endswith(".toml") else a for a in arguments]
     result = slam(path, "--out", tmp_path / "out", *arguments)
     assert result.exit_code == 2
-    assert told in result.output
+    assert message in result.output
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("line", "instead", "told"),
+    ("line", "instead", "message"),
     [
         ("[odometry]", "[odometry]\nunit_m = 1.0", "warning: the path is 16"),
         ("beams = 241", "beams = 200", "41 columns unused: a line has 245, the layout's last"),
@@ -276,17 +276,17 @@ def test_what_cannot_be_mapped_is_told_in_a_line(content, arguments, told, text,
         ),
     ],
 )
-def test_a_layout_that_hardly_fits_is_told(line, instead, told, text, tmp_path):
+def test_a_layout_that_hardly_fits_is_reported(line, instead, message, text, tmp_path):
     layout = (text / "layout.toml").read_text()
     assert line in layout
     (tmp_path / "layout.toml").write_text(layout.replace(line, instead))
     command = (text / "scans.txt", "--layout", tmp_path / "layout.toml", "--out", tmp_path / "o")
     said = slam(*command).output
     assert said.count("warning: ") == 2  # the other one is of the line that is cut off
-    assert told in said
+    assert message in said
 
 
-def test_a_log_without_anything_in_reach_says_why(text, carried, tmp_path):
+def test_a_log_without_anything_in_range_says_why(text, carried, tmp_path):
     path = tmp_path / "scans.txt"
     blind = " ".join(["0"] * len(carried.angles))
     path.write_text("\n".join(f"{k * 200_000} 0 0 0 {blind}" for k in range(20)))

@@ -1,4 +1,4 @@
-"""Links between machines: who is admitted, what is refused, what counts as a loss."""
+"""Links between machines: which workers are admitted, what is refused, what counts as a loss."""
 
 import contextlib
 import socket
@@ -50,14 +50,14 @@ def test_a_worker_with_the_token_is_admitted():
     assert met("the token", VERSIONS) == {}
 
 
-def test_a_worker_with_another_token_is_refused_and_told():
+def test_a_worker_with_another_token_is_refused_with_the_reason():
     assert met("another", VERSIONS) == {
         "leader": "worker 1 was refused: the token is wrong",
         "worker": "the leader refuses this worker: the token is wrong",
     }
 
 
-def test_a_worker_with_other_versions_is_refused_and_told():
+def test_a_worker_with_other_versions_is_refused_with_the_reason():
     reason = "it has numba 0.69.0, the leader has 0.68.1"
     assert met("the token", {**VERSIONS, "numba": "0.69.0"}) == {
         "leader": f"worker 1 was refused: {reason}",

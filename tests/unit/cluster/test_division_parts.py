@@ -83,11 +83,11 @@ def job_of(scenario, **changes):
 
 
 def test_files_that_a_scenario_names_travel(own, tmp_path):
-    place = tmp_path / "there"
-    place.mkdir()
-    there = job_of(own).scenario(place, trust=False)
+    folder = tmp_path / "there"
+    folder.mkdir()
+    there = job_of(own).scenario(folder, trust=False)
     assert there.model_dump(mode="json") == own.model_dump(mode="json")
-    assert there.access.find_file("frames/mine.toml").parent == place / "frames"
+    assert there.access.find_file("frames/mine.toml").parent == folder / "frames"
 
 
 def test_a_worker_reads_no_other_files_for_its_leader(own, tmp_path):

@@ -132,7 +132,7 @@ def test_an_address_without_a_cluster_is_refused_at_once(tmp_path, address, reas
 
 def test_a_large_folder_is_not_copied(tmp_path, monkeypatch):
     pytest.importorskip("ray")
-    monkeypatch.setattr("volery.cluster.ray_worker._MOST_BYTES", 1000)
+    monkeypatch.setattr("volery.cluster.ray_worker._MAX_BYTES", 1000)
     path = study_file(tmp_path, "repetitions = 1\nmetrics = ['success']\n")
     (tmp_path / "runs").mkdir()
     for name in ("runs/large.bin", "large.mcap"):  # neither is copied

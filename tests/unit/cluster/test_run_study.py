@@ -1,4 +1,4 @@
-"""Studies run in this process: results, resuming, failures, logs, equality of all ways to fly."""
+"""Studies run in this process: results, resuming, failures, logs, equality of all executors."""
 
 import json
 import os

@@ -48,9 +48,9 @@ Response = message_type("std_srvs/srv/Trigger_Response")
 
 
 def state(name="uav1", mode="HOLD", battery=0.5):
-    place, velocity = Point(1.0, -2.0, 3.0), Vector3(3.0, 4.0, 0.0)
+    position, velocity = Point(1.0, -2.0, 3.0), Vector3(3.0, 4.0, 0.0)
     return State(
-        name, "f450", "f450", mode, True, False, battery, 12.0, place, velocity, 0.5, -1.0, ""
+        name, "f450", "f450", mode, True, False, battery, 12.0, position, velocity, 0.5, -1.0, ""
     )
 
 
@@ -108,9 +108,9 @@ def test_lines_become_commands() -> None:
         (2, "go_to"),
     ]
     assert desk.sent[1][1].message.altitude == 2.5
-    place = desk.sent[3][1].message
-    assert (place.position.x, place.position.y, place.position.z) == (1.0, -2.0, 3.0)
-    assert place.keep_heading
+    goal = desk.sent[3][1].message
+    assert (goal.position.x, goal.position.y, goal.position.z) == (1.0, -2.0, 3.0)
+    assert goal.keep_heading
     turned = desk.sent[5][1].message
     assert not turned.keep_heading
     assert turned.yaw == pytest.approx(math.pi / 2)
@@ -149,7 +149,7 @@ def test_states_replies_and_refusals_are_shown() -> None:
     assert "not a message" in desk.ground.take(broken, 0)
 
 
-def test_missions_and_slams_are_shown_where_they_are_told() -> None:
+def test_missions_and_slams_are_shown_when_they_are_published() -> None:
     desk = Desk()
     desk.ground.take(frame(STATE, STATE_TYPE, state()), 0)
     status = zero_message(MISSION_TYPE)
@@ -180,7 +180,7 @@ def test_commands_are_echoed_as_they_were_typed() -> None:
 
 
 @pytest.mark.parametrize("name", ["state", "reply"])
-def test_known_names_with_other_types_are_told_of(name: str) -> None:
+def test_known_names_with_other_types_are_shown(name: str) -> None:
     """Programs may send any message under a name of their own."""
     desk = Desk()
     other = frame(name, "geometry_msgs/msg/Point", Point(1.0, 2.0, 3.0))
@@ -197,7 +197,7 @@ def test_known_names_with_other_types_are_told_of(name: str) -> None:
         ("take_off_to 0 3", "take_off ADDRESS [ALTITUDE]"),
     ],
 )
-def test_wrong_usage_is_told_the_right_one(line: str, usage: str) -> None:
+def test_wrong_usage_is_an_error_with_the_right_one(line: str, usage: str) -> None:
     with pytest.raises(CommsError) as error:
         Desk().ground.command(line)
     assert str(error.value) == f"'{line}': usage: {usage}"
@@ -215,8 +215,8 @@ def test_what_a_server_has_kept_is_as_old_as_it_is(clock_s: int) -> None:
     if clock_s == 0:  # a backlog first: the clocks are taken for the same
         assert [take(2 * k * tenth, 80 * tenth + k) for k in range(3)] == ["8.0", "7.8", "7.6"]
     for k in range(40, 44):  # one every 0.2 s, as they are made
-        told = take(2 * k * tenth, 2 * k * tenth + tenth // 10)
-    assert told == "0.0"
+        age = take(2 * k * tenth, 2 * k * tenth + tenth // 10)
+    assert age == "0.0"
     assert take(88 * tenth, 188 * tenth) == "10.0"  # the first of those kept meanwhile
     assert take(186 * tenth, 188 * tenth) == "0.2"
     assert take(188 * tenth, 188 * tenth + tenth // 10) == "0.0"
@@ -253,7 +253,7 @@ class Gcs:
         line = self.process.stdout.readline()
         assert line.startswith(start), line
 
-    def tell(self, line: str) -> None:
+    def write(self, line: str) -> None:
         self.process.stdin.write(line + "\n")
 
 
@@ -262,16 +262,16 @@ def test_gcs_says_that_the_server_is_gone_and_back_and_what_did_not_come() -> No
         gcs.says("joined as ground station")
         first.kill()
         gcs.says("the connection to the server is lost; trying again")
-        gcs.tell("hold uav1")
+        gcs.write("hold uav1")
         gcs.says("queued: hold to uav1")
         first.wait()
         with served(port) as (second, _):
             gcs.says("the server is back")
             second.kill()
             gcs.says("the connection to the server is lost; trying again")
-        gcs.tell("land uav2")
+        gcs.write("land uav2")
         gcs.says("queued: land to uav2")
-        gcs.tell("quit")
+        gcs.write("quit")
         gcs.says("warning: no acknowledgement of: hold to uav1, land to uav2")
         assert gcs.process.wait(60.0) == 0
 
@@ -287,13 +287,13 @@ main()
 def test_a_script_waits_for_the_first_states(graph) -> None:
     vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
     both = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
-    tell = lambda: graph.do(lambda: vehicles.publish(both))  # noqa: E731
+    publish = lambda: graph.do(lambda: vehicles.publish(both))  # noqa: E731
     with served() as (_, port), BridgeHost(graph.gateway) as bridges:
         gcs = Gcs(port)
         gcs.command[1:3] = ["-c", PATIENT]
         bridges.open(StationBridge(port=port))
-        with gcs, repeated(tell):
-            gcs.tell("list\nquit")
+        with gcs, repeated(publish):
+            gcs.write("list\nquit")
             lines = list(gcs.process.stdout)
     rows = [line for line in lines if " HOLD " in line]
     assert any(line.startswith("joined as ground station") for line in lines)
@@ -354,7 +354,7 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
 
     graph.do(lambda: graph.graph.create_service("/uav2/hold", "std_srvs/srv/Trigger", hold))
 
-    def tell():
+    def publish():
         message = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
         graph.do(lambda: vehicles.publish(message))
 
@@ -367,7 +367,7 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         try:
             said = [gcs.stdout.readline()]
             assert "joined as ground station" in said[0]
-            with repeated(tell):
+            with repeated(publish):
                 while sum(": HOLD" in line for line in said) < 2:
                     said.append(gcs.stdout.readline())
             gcs.stdin.write("hold uav2\nland uav1\nnonsense\n")
@@ -395,7 +395,7 @@ def _is_answer(line: str | None) -> bool:
 
 def test_a_mission_takes_what_would_go_against_it(graph) -> None:
     """Hold, land, return and resume are the mission's where there is one; go_to is held before."""
-    asked, told = [], []
+    asked, shown = [], []
 
     def offer(service: str, srvtype: str = "std_srvs/srv/Trigger") -> None:
         response = message_type(f"{srvtype}_Response")
@@ -420,7 +420,7 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
     status.phase = "wait"
 
     async def command() -> None:
-        station = Station(Identity.ground(0), lambda f: told.append(ground.take(f, 0)), port=port)
+        station = Station(Identity.ground(0), lambda f: shown.append(ground.take(f, 0)), port=port)
         ground = GroundStation(station.send)
         await station.start()
 
@@ -431,14 +431,14 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
                 if true():
                     return
                 await asyncio.sleep(0.05)
-            raise AssertionError((asked, told))
+            raise AssertionError((asked, shown))
 
-        await until(lambda: "uav1: mission wait 0" in told and "uav2: HOLD" in told)
+        await until(lambda: "uav1: mission wait 0" in shown and "uav2: HOLD" in shown)
         lines = ("hold 0", "land 0", "return 0", "resume 0", "go_to 0 1 2 3", "hold 1", "resume 1")
         for count, line in enumerate(lines):
             ground.command(line)
             await until(
-                lambda count=count: sum("done" in t or "no m" in t for t in told if t) > count
+                lambda count=count: sum("done" in t or "no m" in t for t in shown if t) > count
             )
         await station.stop()
 
@@ -451,7 +451,7 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
         "/uav1/go_to",
         "/uav2/hold",
     ]
-    assert [text for text in told if text][-1] == "uav2: resume: uav2 has no mission"
+    assert [text for text in shown if text][-1] == "uav2: resume: uav2 has no mission"
 
 
 def test_the_server_ends_in_good_order() -> None:

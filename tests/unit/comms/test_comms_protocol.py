@@ -135,7 +135,7 @@ def test_undamaged_frames_are_found_behind_a_damaged_one(sent, noise, data) -> N
     assert plain(found) == sent[1:]
 
 
-def test_flaws_are_told_apart() -> None:
+def test_flaws_are_distinguished() -> None:
     frame = StationFrame(StationFrameKind.SENSING, 1, 2, 3, 4, 5, bytes(range(20)))
     whole = encoded(frame)
     head, body = bytearray(whole), bytearray(whole)

@@ -64,7 +64,7 @@ def test_the_server_settles_what_has_come() -> None:
     assert bench.router.statistics.delivered == 1
 
 
-def test_unknown_stations_are_refused_and_told() -> None:
+def test_messages_to_unknown_stations_are_refused_with_a_reason() -> None:
     bench = Bench()
     one = bench.station(0)
     bench.run(LATE)
@@ -98,7 +98,7 @@ def test_nothing_is_lost_doubled_or_reordered_when_the_server_is_killed() -> Non
         bench.station(address)
     for k in range(10):
         bench.send(0, 1, str(k))
-    bench.run(acknowledge=False)  # they came, and nobody knows
+    bench.run(acknowledge=False)  # they came, but without acknowledgement
     assert bench.got[1] == numbered(10)
     bench.restart()
     for k in range(10, 15):
@@ -136,7 +136,7 @@ def test_nothing_is_lost_or_doubled_when_a_connection_breaks() -> None:
     assert one.unsettled == 0
 
 
-def test_a_source_that_starts_anew_is_heard() -> None:
+def test_messages_of_a_source_that_restarts_are_received() -> None:
     bench = Bench()
     bench.station(1)
     for session in (1, 2, 3):
@@ -228,7 +228,7 @@ def test_a_station_that_never_acknowledges_fills_its_own_queue_only() -> None:
         other.acknowledge(bench.now)
         bench.router.receive(bench.connections[2], other.take(), bench.now)
     assert bench.got[1] == numbered(5)
-    assert bench.router.statistics.dropped_sensing == 25  # 40, less 5 on the way and 10 waiting
+    assert bench.router.statistics.dropped_sensing == 25  # 40, less 5 in transit and 10 waiting
     assert bench.got[2] == numbered(40)
 
 
@@ -243,7 +243,7 @@ def test_queues_are_bounded_by_bytes() -> None:
     assert len(bench.got[1]) == 20_000 // 1032
 
 
-def test_large_messages_take_the_place_of_several_small_ones() -> None:
+def test_large_messages_replace_several_small_ones() -> None:
     """One for one they would fill a queue far beyond its bytes."""
     bench = Bench(RouterSettings(queue_bytes=20_000))
     bench.station(0), bench.station(1)
@@ -287,7 +287,7 @@ def test_old_messages_expire() -> None:
     assert bench.got[1] == []
 
 
-def test_sensing_for_many_does_not_wait_for_who_is_long_away() -> None:
+def test_sensing_for_many_does_not_wait_for_stations_long_away() -> None:
     bench = Bench()
     one, _ = bench.station(0), bench.station(1)
     bench.run(10 * S)
@@ -313,7 +313,7 @@ def test_sensing_for_many_does_not_wait_for_who_is_long_away() -> None:
     assert bench.got[1] == [b"newest", b"fresh"]
 
 
-def test_sensing_for_many_waits_for_who_is_away_shortly() -> None:
+def test_sensing_for_many_waits_for_stations_shortly_away() -> None:
     bench = Bench()
     bench.station(0)
     bench.station(1)
@@ -395,7 +395,9 @@ HELLO = encode_hello(Hello(0, 0, 4, "", ""))
         ),
     ],
 )
-def test_who_breaks_the_protocol_is_told_and_let_go(frame: bytes, reason: Reason) -> None:
+def test_a_station_that_breaks_the_protocol_is_refused_and_disconnected(
+    frame: bytes, reason: Reason
+) -> None:
     router = Router(RouterSettings(), 0, 1)
     connection = router.connect(0)
     router.receive(connection, frame, 0)
@@ -419,7 +421,7 @@ def test_tokens() -> None:
 
 
 def test_corrupt_and_half_frames_are_counted_and_too_many_end_the_connection() -> None:
-    bench = Bench(RouterSettings(most_corrupt=3))
+    bench = Bench(RouterSettings(max_corrupt=3))
     bench.station(0), bench.station(1)
     whole = encode_frame(StationFrameKind.SENSING, 0, 1, 1, 1, 0, b"whole")
     broken = bytearray(whole)
@@ -461,7 +463,7 @@ def test_a_link_may_lose_and_delay_but_never_reorders() -> None:
 
 
 def test_there_is_room_for_so_many_connections() -> None:
-    router = Router(RouterSettings(most_connections=2), 0, 1)
+    router = Router(RouterSettings(max_connections=2), 0, 1)
     assert [router.connect(0) for _ in range(3)] == [1, 2, None]
 
 

@@ -68,7 +68,7 @@ def test_messages_of_both_kinds_come_in_order() -> None:
     with_server(test, RouterSettings(grace_s=0.0))
 
 
-def test_a_station_that_does_not_read_delays_nobody() -> None:
+def test_a_station_that_does_not_read_delays_no_other() -> None:
     async def test(server) -> None:
         got: list[bytes] = []
         one, reader = await joined(server, 0), await joined(server, 1, got)
@@ -89,7 +89,7 @@ def test_a_station_that_does_not_read_delays_nobody() -> None:
     with_server(test)
 
 
-def test_wrong_tokens_and_full_houses_are_told() -> None:
+def test_wrong_tokens_and_full_groups_are_refused() -> None:
     async def test(server) -> None:
         with pytest.raises(CommsError, match="token"):
             await joined(server, 0, token="wrong")
@@ -102,7 +102,7 @@ def test_wrong_tokens_and_full_houses_are_told() -> None:
     with_server(test, RouterSettings(token="open"))
 
 
-def test_noise_and_half_frames_harm_nobody() -> None:
+def test_noise_and_half_frames_do_no_harm() -> None:
     async def test(server) -> None:
         got: list[bytes] = []
         one, two = await joined(server, 0), await joined(server, 1, got)

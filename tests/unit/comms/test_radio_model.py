@@ -29,12 +29,12 @@ def frame_of(number: int, *, source: int = 0, to: int = ALL, size: int = 100) ->
 
 
 def link_of(
-    radio: Radio, places: dict[int, tuple[float, ...]], foliage_m: float = 0.0
+    radio: Radio, positions: dict[int, tuple[float, ...]], foliage_m: float = 0.0
 ) -> RadioChannel:
     def looks(starts: np.ndarray, _ends: np.ndarray) -> Paths:
         return Paths.clear(len(starts))._replace(foliage_m=np.full(len(starts), foliage_m))
 
-    return RadioChannel(radio, 1, lambda: {a: np.array(p) for a, p in places.items()}, looks)
+    return RadioChannel(radio, 1, lambda: {a: np.array(p) for a, p in positions.items()}, looks)
 
 
 def test_free_space_is_that_of_friis() -> None:
@@ -53,9 +53,9 @@ def test_foliage_by_weissberger_and_by_the_itu() -> None:
     expected = [0.0, 4.5, 1.33 * 100.0**0.588, 1.33 * 400.0**0.588]
     np.testing.assert_allclose(found, expected)
     assert woodland(949.0) == pytest.approx((0.17, 26.5))
-    per_m, most = woodland(2400.0)
+    per_m, max_db = woodland(2400.0)
     assert 0.34 < per_m < 0.40
-    assert 34.1 < most < 37.0
+    assert 34.1 < max_db < 37.0
     p833 = foliage_loss_db(Radio(frequency_mhz=949.0), np.array([1e-3, 20.0, 1e4]))
     assert p833[0] == pytest.approx(0.17e-3, rel=1e-4)
     assert p833[1] == pytest.approx(26.5 * (1.0 - math.exp(-20.0 * 0.17 / 26.5)))
@@ -89,7 +89,7 @@ def test_a_message_takes_its_time_on_the_air_and_waits_for_the_channel() -> None
     first, second = frame_of(1), frame_of(1, source=2)
     air = air_time_ns(radio, len(first.data))
     assert link(S, 0, 1, first) == (False, air + 1_000_000)
-    assert link(S, 0, 2, first) == (False, air + 1_000_000)  # heard by all at once
+    assert link(S, 0, 2, first) == (False, air + 1_000_000)  # received by all at once
     assert link(S, 2, 0, second) == (False, 2 * air + 1_000_000)
     assert link.counts == {"sent": 2, "received": 3}
 
@@ -103,7 +103,7 @@ def test_a_crowded_channel_drops_what_would_wait_too_long() -> None:
 
 
 def test_frames_for_one_station_are_tried_again() -> None:
-    """At the edge of reach one try in two fails; four tries in a row one time in sixteen."""
+    """At the edge of the range one try in two fails; four tries in a row one time in sixteen."""
     radio = Radio(shadowing_db=0.0, retries=3)
     size = len(frame_of(1).data)
     snrs = np.linspace(-10.0, 10.0, 4001)
@@ -119,10 +119,10 @@ def test_frames_for_one_station_are_tried_again() -> None:
     assert to_one == pytest.approx(1.0 / 16.0, abs=0.03)
 
 
-def test_draws_do_not_depend_on_who_else_speaks() -> None:
+def test_draws_do_not_depend_on_other_senders() -> None:
     radio = Radio(power_dbm=-22.0, queue_s=10.0)
-    places = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0), 2: (0.0, 60.0, 5.0)}
-    alone, busy = link_of(radio, places), link_of(radio, places)
+    positions = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0), 2: (0.0, 60.0, 5.0)}
+    alone, busy = link_of(radio, positions), link_of(radio, positions)
     lost_alone = [alone(k * S, 0, 1, frame_of(k)).lost for k in range(1, 200)]
     lost_busy = []
     for k in range(1, 200):
@@ -132,9 +132,9 @@ def test_draws_do_not_depend_on_who_else_speaks() -> None:
     assert 0 < sum(lost_alone) < len(lost_alone)
 
 
-def test_foliage_shortens_the_reach() -> None:
-    places = {0: (0.0, 0.0, 5.0), 1: (150.0, 0.0, 5.0)}
-    clear, wood = link_of(Radio(), places), link_of(Radio(), places, foliage_m=60.0)
+def test_foliage_shortens_the_range() -> None:
+    positions = {0: (0.0, 0.0, 5.0), 1: (150.0, 0.0, 5.0)}
+    clear, wood = link_of(Radio(), positions), link_of(Radio(), positions, foliage_m=60.0)
     loss = foliage_loss_db(Radio(), np.array([60.0]))[0]
     assert clear.snr_db(0, 0, 1) - wood.snr_db(0, 0, 1) == pytest.approx(loss)
     assert loss > 10.0
@@ -144,8 +144,8 @@ def test_foliage_shortens_the_reach() -> None:
 def test_a_jammer_adds_its_power_to_the_noise_of_each_receiver() -> None:
     """Two stations 60 m apart, a jammer 10 m from the second: it loses frames, the first none."""
     radio = Radio(shadowing_db=0.0)
-    places = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
-    link = link_of(radio, places)
+    positions = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
+    link = link_of(radio, positions)
     clear = link.snr_db(0, 0, 1)
     jammer = Jammer((70.0, 0.0, 5.0), 30.0)
     link.jam(jammer)
@@ -173,8 +173,12 @@ def test_a_jammer_adds_its_power_to_the_noise_of_each_receiver() -> None:
 
 def test_a_weak_or_distant_jammer_changes_little_and_foliage_shields_from_it() -> None:
     radio = Radio(shadowing_db=0.0)
-    places = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
-    far, near, wood = link_of(radio, places), link_of(radio, places), link_of(radio, places, 60.0)
+    positions = {0: (0.0, 0.0, 5.0), 1: (60.0, 0.0, 5.0)}
+    far, near, wood = (
+        link_of(radio, positions),
+        link_of(radio, positions),
+        link_of(radio, positions, 60.0),
+    )
     clear, clear_wood = near.snr_db(0, 0, 1), wood.snr_db(0, 0, 1)
     far.jam(Jammer((100_000.0, 0.0, 5.0), 0.0))
     assert clear - far.snr_db(0, 0, 1) == pytest.approx(0.0, abs=0.01)
@@ -186,8 +190,8 @@ def test_a_weak_or_distant_jammer_changes_little_and_foliage_shields_from_it() -
 
 
 def test_a_kept_state_is_not_touched_by_what_follows() -> None:
-    places = {0: (0.0, 0.0, 5.0), 1: (40.0, 0.0, 5.0)}
-    link = link_of(Radio(bit_rate_mbit_s=0.1), places)
+    positions = {0: (0.0, 0.0, 5.0), 1: (40.0, 0.0, 5.0)}
+    link = link_of(Radio(bit_rate_mbit_s=0.1), positions)
     link(0, 0, 1, frame_of(1, size=1000))
     kept = link.get_state()
     after = [link(0, 0, 1, frame_of(k, size=1000)) for k in (2, 3, 4)]

@@ -47,11 +47,11 @@ class Aboard:
     def __init__(self, name: str, port: int, **parameters: Any) -> None:
         self.graph = Graph(time.monotonic_ns)
         self.rings: list[Callable[[], None]] = []
-        self.heard: list[str] = []
+        self.received: list[str] = []
         context = Context(self.graph, self, time.monotonic_ns)
         overrides = {"topics": [TOPIC], "server": f"127.0.0.1:{port}", **parameters}
         self.radio = RadioNode(context=context, namespace=f"/{name}", parameter_overrides=overrides)
-        self.graph.subscribe(f"/{name}/radio/hello", self._hear)
+        self.graph.subscribe(f"/{name}/radio/hello", self._receive)
         self._says = self.graph.advertise(f"/{name}/hello", String)
 
     def every(self, _period_s: float, callback: Callable[[], None], **_options: Any) -> None:
@@ -63,8 +63,8 @@ class Aboard:
     def at(self, _time_ns: int, _action: Callable[[], Any]) -> None:
         raise AssertionError
 
-    def _hear(self, published: Published) -> None:
-        self.heard.append(published.message.data)
+    def _receive(self, published: Published) -> None:
+        self.received.append(published.message.data)
 
     def say(self, text: str) -> None:
         self._says.publish(String(text))
@@ -91,16 +91,16 @@ def test_topics_cross_the_server(port: int) -> None:
     for k in range(20):
         one.say(f"one {k}")
         two.say(f"two {k}")
-    until(lambda: len(one.heard) == len(two.heard) == 20, one, two)
-    assert two.heard == [f"one {k}" for k in range(20)]
-    assert one.heard == [f"two {k}" for k in range(20)]
+    until(lambda: len(one.received) == len(two.received) == 20, one, two)
+    assert two.received == [f"one {k}" for k in range(20)]
+    assert one.received == [f"two {k}" for k in range(20)]
     two.radio.destroy_node()
-    one.say("nobody there")
+    one.say("no subscriber")
     one.radio.destroy_node()
 
 
-def test_who_speaks_before_there_is_a_server_is_heard_later(port: int) -> None:
-    """Nobody answers at the first port; the station waits, and holds what it is told."""
+def test_messages_from_before_there_is_a_server_are_received_later(port: int) -> None:
+    """No server answers at the first port; the station waits, and queues its messages."""
     early = Aboard("uav1", 1)
     early.say("early")
     assert not early.radio.joined

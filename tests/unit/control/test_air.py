@@ -25,12 +25,12 @@ def wrench(pitch, front, back, wind):
     turn = rotations.matrix(rotations.from_rpy(0.0, pitch, 0.0))
     v = turn.T @ [-wind, 0.0, 0.0]
     force, torque = -0.5 * RHO * AREA * np.linalg.norm(v) * v, np.zeros(3)
-    for place in F450.rotors.places:
-        speed = front if place.position_m[0] > 0 else back
+    for rotor in F450.rotors.places:
+        speed = front if rotor.position_m[0] > 0 else back
         thrust = LIFT * speed**2 * (1 - abs(v[2]) / 25.0)
         pull = np.array([0.0, 0.0, thrust]) - LOSS * speed * v * [1, 1, 0]
         force = force + pull
-        torque = torque + np.cross(place.position_m, pull)
+        torque = torque + np.cross(rotor.position_m, pull)
     return turn @ force, torque
 
 
@@ -94,16 +94,16 @@ def test_a_gust_pushes_and_passes():
     fleet = in_air()
     fleet.advance(1000, FLAT.grid)
     fleet.add_gust(Gust((5.0, 0.0, 0.0), 1.0, 0.4, 2.5))
-    place, _, tilt = track(fleet, 12.0)
-    assert 0.1 < place[:, 0].max() < 3.0
+    position, _, tilt = track(fleet, 12.0)
+    assert 0.1 < position[:, 0].max() < 3.0
     assert tilt.max() > 0.1
-    np.testing.assert_allclose(place[-1], [0, 0, 50], atol=0.05)
+    np.testing.assert_allclose(position[-1], [0, 0, 50], atol=0.05)
     assert not fleet.state.air_velocity_map.any()
     assert fleet.weather.gusts[0].end_s == 2.5
 
 
 def test_a_snapshot_holds_the_weather():
-    """The turbulence, its place in the stream, and a gust that was added, all come back."""
+    """The turbulence, its position in the stream, and a gust that was added, all come back."""
     fleet = Fleet(
         [F450] * 2, [[0, 0, 20], [5, 0, 20]], [LEVEL] * 2, weather=Weather((4, 0, 0), w20_m_s=12.0)
     )
@@ -132,10 +132,10 @@ def test_turbulence_differs_by_uav_and_seed_and_shakes():
         fleet.advance(3000, FLAT.grid)
         return fleet.state.air_velocity_map.copy(), fleet.state.position_map.copy()
 
-    (air, place), (other, _) = flown(1), flown(2)
+    (air, position), (other, _) = flown(1), flown(2)
     assert np.abs(air[0] - air[1]).min() > 1e-3
     assert np.abs(air - other).min() > 1e-3
-    assert np.abs(place - [[0, 0, 20], [5, 0, 20]]).max() > 0.05
+    assert np.abs(position - [[0, 0, 20], [5, 0, 20]]).max() > 0.05
 
 
 def test_too_many_gusts_are_refused_and_leave_the_weather_alone():

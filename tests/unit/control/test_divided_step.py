@@ -29,8 +29,8 @@ def _always_divided(monkeypatch):
 
 def swarm():
     """Crazyflies in five layers above each other, some landed, one kinematic, in turbulence."""
-    place = np.stack(np.meshgrid(np.arange(10), np.arange(6), np.arange(5)), axis=-1).reshape(-1, 3)
-    position = place * (0.6, 0.6, 0.7) + (0.0, 0.0, 0.4)
+    cell = np.stack(np.meshgrid(np.arange(10), np.arange(6), np.arange(5)), axis=-1).reshape(-1, 3)
+    position = cell * (0.6, 0.6, 0.7) + (0.0, 0.0, 0.4)
     position[:7, 2] = 0.02
     modes = [FlightMode.LANDED] * 7 + [FlightMode.HOLD] * (COUNT - 7)
     plants = [Kinematic() if i == 9 else RigidBody() for i in range(COUNT)]

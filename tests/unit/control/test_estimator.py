@@ -24,7 +24,7 @@ FIX_VARIANCE = np.array([0.1, 0.1, 0.2, 0.04, 0.04, 0.1])
 
 
 def still(count, settings=SETTINGS, **options):
-    """An estimator that believes to stand in the origin, unless told otherwise."""
+    """An estimator that starts at the origin, unless `options` say otherwise."""
     given = {
         "position": np.zeros((count, 3)),
         "velocity": np.zeros((count, 3)),
@@ -91,7 +91,7 @@ def test_a_kept_state_is_gone_back_to_exactly():
 
 
 def test_order_of_arrival_does_not_matter():
-    """A fix that comes 100 ms late finds its place in time."""
+    """A fix that comes 100 ms late is fused at its own time."""
     prompt, tardy = still(1), still(1)
     for k in range(200):
         for estimator, delay in ((prompt, 0), (tardy, 20)):
@@ -185,26 +185,26 @@ def test_a_slam_pose_replaces_gnss():
     assert estimator.covariance(rows)[0, 2, 2] < 0.01
 
 
-def hover_by_poses(estimator, first, last, *, place=(0.0, 0.0, 0.0), yaw=0.0):
+def hover_by_poses(estimator, first, last, *, position=(0.0, 0.0, 0.0), yaw=0.0):
     attitude = rotations.from_rpy([0.0], [0.0], [yaw])
     variances = [2.5e-3] * 3 + [3e-4] * 3
     for k in range(first, last + 1):
         if k % 20 == 0:
-            estimator.fuse_pose([0], k * STEP, [place], attitude, variances)
+            estimator.fuse_pose([0], k * STEP, [position], attitude, variances)
         estimator.predict([0], k * STEP, np.zeros((1, 3)), UP[None])
 
 
 def test_a_slam_that_found_itself_elsewhere_is_believed_when_it_insists():
-    estimator, place, yaw = still(1, velocity=[[0.5, 0.0, 0.0]]), (4.0, -3.0, 0.0), 0.6
-    hover_by_poses(estimator, 0, 1, place=(0.0, 0.0, 0.0))
-    hover_by_poses(estimator, 2, 200, place=place, yaw=yaw)  # not for a second yet
+    estimator, position, yaw = still(1, velocity=[[0.5, 0.0, 0.0]]), (4.0, -3.0, 0.0), 0.6
+    hover_by_poses(estimator, 0, 1, position=(0.0, 0.0, 0.0))
+    hover_by_poses(estimator, 2, 200, position=position, yaw=yaw)  # not for a second yet
     gate = estimator.gate(AidingSource.POSE_POSITION)
     assert gate.rejected[0] == 8
     assert np.linalg.norm(estimator.state.position_map[0]) < 0.6
-    hover_by_poses(estimator, 201, 275, place=place, yaw=yaw)
+    hover_by_poses(estimator, 201, 275, position=position, yaw=yaw)
     assert estimator.restarts[0] == 1
     assert gate.rejected[0] == 12
-    np.testing.assert_allclose(estimator.state.position_map[0], place, atol=0.2)
+    np.testing.assert_allclose(estimator.state.position_map[0], position, atol=0.2)
     assert rotations.yaw_of(estimator.state.attitude[0]) == pytest.approx(yaw, abs=0.02)
     course = [0.5 * np.cos(yaw), 0.5 * np.sin(yaw), 0.0]
     np.testing.assert_allclose(estimator.state.velocity_map[0], course, atol=0.15)
@@ -292,7 +292,7 @@ def test_odometry_covariances_are_those_of_drawn_errors():
     np.testing.assert_allclose(pose[0, 4], P[0, 0, 7])
 
 
-def test_misuse_is_told():
+def test_misuse_is_an_error():
     estimator = still(2)
     estimator.predict([0], 5, np.zeros((1, 3)), np.zeros((1, 3)))
     with pytest.raises(EstimatorError, match="row 0 at 5 ns is not later"):

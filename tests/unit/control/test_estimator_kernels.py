@@ -8,7 +8,7 @@ from volery.control.estimator.covariance_kernels import (
     carry,
     correct,
     decay,
-    forget_place,
+    forget_position,
     normalised_innovation,
     transform,
     turn_errors,
@@ -79,8 +79,8 @@ def _turn_errors(P, x, y, z):
 
 
 @fused_kernel
-def _forget_place(P, variance):
-    forget_place(P, variance)
+def _forget_position(P, variance):
+    forget_position(P, variance)
 
 
 def some_filter(draw, rpy=(0.15, -0.12, 2.0)):
@@ -304,10 +304,10 @@ def test_taking_over_a_turn_turns_the_remaining_error():
     assert np.abs(start - G @ start @ G.T).max() > 0.01  # which would be wrong
 
 
-def test_a_restarted_place_is_as_wrong_as_the_receiver():
+def test_a_restarted_position_is_as_wrong_as_the_receiver():
     start = some_covariance(np.random.default_rng(11))
     P, variance = start.ravel().copy(), np.array([1.0, 2, 3, 4, 5, 6])
-    _forget_place(P, variance)
+    _forget_position(P, variance)
     A = np.eye(N)
     A[:6] = 0
     A[range(3), range(17, 20)] = -1

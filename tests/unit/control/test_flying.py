@@ -43,10 +43,10 @@ def test_a_whole_flight():
     assert fleet.drain_events() == []
 
     fleet.take_off(0, 5.0)
-    place, _, _ = track(fleet, 8.0)
+    position, _, _ = track(fleet, 8.0)
     assert fleet.mode(0) is FlightMode.HOLD
-    np.testing.assert_allclose(place[-1], start + np.array([0, 0, 5]), atol=0.05)
-    assert np.abs(place[:, :2]).max() < 0.05
+    np.testing.assert_allclose(position[-1], start + np.array([0, 0, 5]), atol=0.05)
+    assert np.abs(position[:, :2]).max() < 0.05
     assert float(rotations.yaw_of(fleet.state.attitude[0])) == pytest.approx(0.5, abs=0.01)
 
     fleet.command_position(0, (20, 10, 6))
@@ -55,10 +55,10 @@ def test_a_whole_flight():
     assert fleet.mode(0) is FlightMode.HOLD
 
     fleet.return_home(0, 8.0)
-    place, _, _ = track(fleet, 40.0)
-    assert place[:, 2].max() > start[2] + 7.7
+    position, _, _ = track(fleet, 40.0)
+    assert position[:, 2].max() > start[2] + 7.7
     assert fleet.mode(0) is FlightMode.LANDED
-    np.testing.assert_allclose(place[-1], start, atol=0.1)
+    np.testing.assert_allclose(position[-1], start, atol=0.1)
     assert not fleet.state.rotor_speed[0].any()
     assert kinds(fleet) == [
         ("mode", "HOLD"),
@@ -80,10 +80,10 @@ def test_velocity_times_out():
     fleet.advance(9, FLAT.grid)  # within a guidance tick
     assert fleet.mode(0) is FlightMode.HOLD
     track(fleet, 6.0)
-    place = fleet.state.position_map[0].copy()
+    position = fleet.state.position_map[0].copy()
     assert np.linalg.norm(fleet.state.velocity_map[0]) < 0.02
     track(fleet, 3.0)
-    np.testing.assert_allclose(fleet.state.position_map[0], place, atol=0.02)
+    np.testing.assert_allclose(fleet.state.position_map[0], position, atol=0.02)
 
 
 def test_time_out_is_each_uavs_own():
@@ -127,7 +127,7 @@ def test_lands_on_slopes(degrees):
 
 @pytest.mark.parametrize("error", [(1.1, 0.4, 1.7), (0.8, -0.8, 0.0)])
 def test_a_touch_down_that_shakes_the_estimate_is_a_landing(error):
-    """The shock of it leaves speeds off by a metre a second, as long as nobody tells better."""
+    """The shock of it leaves speeds off by a metre a second until a sensor corrects them."""
     ground = slope(8)
     fleet = in_air((3, 2, float(ground.height(3, 2)) + 4.0))
     fleet.land(0)
@@ -265,10 +265,10 @@ def test_stands_on_slopes_without_creeping(degrees):
     fleet = on_ground(3, 2, 0.5, ground)
     fleet.command_rotor_speeds(0, [1e-3] * 4)  # keeps it awake
     fleet.advance(500, ground.grid)
-    place = fleet.state.position_map[0].copy()
+    position = fleet.state.position_map[0].copy()
     fleet.advance(3000, ground.grid)
     assert not fleet.state.asleep[0]
-    assert np.linalg.norm(fleet.state.position_map[0] - place) / 3.0 < 1e-5
+    assert np.linalg.norm(fleet.state.position_map[0] - position) / 3.0 < 1e-5
     assert np.linalg.norm(fleet.state.acceleration_map[0]) < 0.05  # an IMU at rest reads gravity
 
 
@@ -286,13 +286,13 @@ def test_impact(speed, on_contact):
     fleet = in_air((0, 0, 10.0), on_contact=on_contact)
     fleet.command_rotor_speeds(0, [0] * 4)
     fleet.state.velocity_map[0] = (0, 0, -speed)
-    place, _, _ = track(fleet, 6.0, every=1)
+    position, _, _ = track(fleet, 6.0, every=1)
     impact = next(e for e in fleet.drain_events() if e.kind is FleetEventKind.IMPACT)
     assert impact.uav == 0
     assert impact.speed_m_s > 0.85 * speed  # the air brakes it
     assert impact.position_map[2] < 0.2
-    assert place[impact.step - 1, 2] == pytest.approx(impact.position_map[2])
-    assert place[:, 2].min() > 0.0
+    assert position[impact.step - 1, 2] == pytest.approx(impact.position_map[2])
+    assert position[:, 2].min() > 0.0
     assert fleet.state.crashed[0] == (on_contact == "crash")
     if on_contact == "crash":
         assert fleet.mode(0) is FlightMode.CRASHED
@@ -312,15 +312,15 @@ def test_nothing_falls_through_rough_ground(on_contact):
     rng = np.random.default_rng(4)
     ground = Terrain.from_heights(rng.uniform(0, 4, (41, 41)), 5.0, (-100.0, -100.0))
     count = 30
-    place = np.column_stack([rng.uniform(-60, 60, (count, 2)), np.full(count, 15.0)])
+    position = np.column_stack([rng.uniform(-60, 60, (count, 2)), np.full(count, 15.0)])
     attitude = rotations.normalize(rng.normal(size=(count, 4)))
-    fleet = Fleet([F450] * count, place, attitude, on_contact=on_contact)
+    fleet = Fleet([F450] * count, position, attitude, on_contact=on_contact)
     for i in range(count):
         fleet.command_rotor_speeds(i, [0] * 4)
-    way = rng.normal(size=(count, 3))
-    way[:, 2] = -np.abs(way[:, 2]) - 0.5
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    fleet.state.velocity_map[:] = way * rng.uniform(10, 60, (count, 1))
+    direction = rng.normal(size=(count, 3))
+    direction[:, 2] = -np.abs(direction[:, 2]) - 0.5
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    fleet.state.velocity_map[:] = direction * rng.uniform(10, 60, (count, 1))
     fleet.state.omega_body[:] = rng.normal(size=(count, 3)) * 10
     points = contact_points(F450)
     for _ in range(500):
@@ -328,7 +328,7 @@ def test_nothing_falls_through_rough_ground(on_contact):
         turn = rotations.matrix(fleet.state.attitude)
         world = np.einsum("nij,pj->npi", turn, points) + fleet.state.position_map[:, None]
         gap = world[..., 2] - ground.height(world[..., 0], world[..., 1])
-        assert gap.min() > -0.06  # the way of one step
+        assert gap.min() > -0.06  # the path of one step
     impacts = {e.uav for e in fleet.drain_events() if e.kind is FleetEventKind.IMPACT}
     assert impacts == set(range(count))
 
@@ -421,8 +421,8 @@ def test_slicing_changes_nothing():
 def test_a_uav_flies_alike_in_company():
     many, ground = busy_fleet()
     many.advance(1500, ground.grid)
-    place = busy_fleet()[0].state.position_map[:1]
-    alone = Fleet([F450], place, [LEVEL], weather=STORM)
+    position = busy_fleet()[0].state.position_map[:1]
+    alone = Fleet([F450], position, [LEVEL], weather=STORM)
     alone.command_position(0, (10, 20, 60), yaw=1.0)
     alone.advance(1500, ground.grid)
     for name in ("position_map", "velocity_map", "attitude", "rotor_speed", "air_velocity_map"):
@@ -453,7 +453,7 @@ def test_budgets_stop_after_a_whole_step(budget):
     for i in (0, 1):
         fleet.command_rotor_speeds(i, [770] * 4)
     getattr(fleet.state, budget)[1] = 0.5
-    way = fleet.state.position_map.copy()
+    start = fleet.state.position_map.copy()
     done = fleet.advance(1000, FLAT.grid)
     assert 0 < done < 45  # at the guidance tick before
     assert fleet.step == done
@@ -462,7 +462,7 @@ def test_budgets_stop_after_a_whole_step(budget):
         done += fleet.advance(1000, FLAT.grid)
     assert 45 < done < 60
     assert fleet.step == done
-    flown = np.linalg.norm(fleet.state.position_map - way, axis=1)
+    flown = np.linalg.norm(fleet.state.position_map - start, axis=1)
     assert flown[0] == pytest.approx(flown[1], rel=1e-6)
     assert 0.48 < flown[1] < 0.52
     getattr(fleet.state, budget)[1] = np.inf

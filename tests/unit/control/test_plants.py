@@ -45,8 +45,8 @@ def test_a_whole_flight(name):
         fleet.state.position_map[0], pose[:3] + np.array([0, 0, 5]), atol=0.05
     )
     fleet.command_position(0, (20, 10, 6), yaw=1.0)
-    place, velocity, _ = track(fleet, 14.0)
-    np.testing.assert_allclose(place[-1], (20, 10, 6), atol=0.05)
+    position, velocity, _ = track(fleet, 14.0)
+    np.testing.assert_allclose(position[-1], (20, 10, 6), atol=0.05)
     assert np.hypot(*velocity[:, :2].T).max() < 1.1 * F450.limits.speed_m_s
     assert float(rotations.yaw_of(fleet.state.attitude[0])) == pytest.approx(1.0, abs=0.02)
     fleet.return_home(0, 8.0)
@@ -67,13 +67,13 @@ def mixed_fleet():
     """Each plant in several modes, one going into the ground."""
     plants = [RigidBody(), IDENTIFIED, KINEMATIC, IDENTIFIED, KINEMATIC, Kinematic(0.2, True)]
     z = [30.0, 30.0, 30.0, 30.0, 1.0, 30.0]
-    places = [[8.0 * i, 0.0, z[i]] for i in range(6)]
-    fleet = Fleet([F450] * 6, places, [LEVEL] * 6, plants=plants)
+    positions = [[8.0 * i, 0.0, z[i]] for i in range(6)]
+    fleet = Fleet([F450] * 6, positions, [LEVEL] * 6, plants=plants)
     fleet.command_position(0, (10, 20, 40), yaw=1.0)
     fleet.command_velocity_body(1, (4, 1, 0), 0.4)
     t = np.linspace(0, 3, 7)
-    way = np.stack([16 + t**2, np.sin(t), 30 + 0 * t], axis=1)
-    fleet.command_trajectory(2, Trajectory.from_samples(t, way, yaw=t))
+    path = np.stack([16 + t**2, np.sin(t), 30 + 0 * t], axis=1)
+    fleet.command_trajectory(2, Trajectory.from_samples(t, path, yaw=t))
     fleet.command_attitude(3, rotations.from_rpy(0.2, -0.1, 0.5), F450.weight)
     fleet.command_velocity_map(4, (1, 0, -3))
     fleet.command_velocity_body(5, (30, 0, 0), 3.0)
@@ -289,15 +289,15 @@ def test_a_stream_of_poses_has_the_velocity_between_them():
     rates, felt = [], []
     for k in range(100):
         t = k * period * 1e-3
-        place = 2.0 * np.array([math.sin(t), -math.cos(t), 0.0]) + (0, 0, 50)
+        position = 2.0 * np.array([math.sin(t), -math.cos(t), 0.0]) + (0, 0, 50)
         fleet.command_pose(
-            0, place, rotations.from_rpy(0, 0, t), stamp_ns=round(t * NS_PER_S) + 5000
+            0, position, rotations.from_rpy(0, 0, t), stamp_ns=round(t * NS_PER_S) + 5000
         )
         for _ in range(period):
             fleet.advance(1, FLAT.grid)
             rates.append(fleet.state.omega_body[0].copy())
             felt.append(fleet.state.acceleration_map[0].copy())
-        np.testing.assert_array_equal(fleet.state.position_map[0], place)
+        np.testing.assert_array_equal(fleet.state.position_map[0], position)
         if k > 1:
             middle = t - 0.5 * period * 1e-3
             moving = 2.0 * np.array([math.cos(middle), math.sin(middle), 0.0])
@@ -308,7 +308,7 @@ def test_a_stream_of_poses_has_the_velocity_between_them():
     fleet.advance(1000, FLAT.grid)  # the stream ends
     np.testing.assert_array_equal(fleet.state.velocity_map[0], 0.0)
     np.testing.assert_array_equal(fleet.state.omega_body[0], 0.0)
-    np.testing.assert_array_equal(fleet.state.position_map[0], place)
+    np.testing.assert_array_equal(fleet.state.position_map[0], position)
 
 
 def test_poses_without_time_in_bursts_have_the_mean_velocity():

@@ -45,10 +45,10 @@ def asked(control_state, gains):
     return axis * upwards / axis[2] - [0, 0, GRAVITY]
 
 
-def double_integrator(seconds, place, velocity=(0, 0, 0), push=(0, 0, 0), tick=1e-3, law=None):
+def double_integrator(seconds, position, velocity=(0, 0, 0), push=(0, 0, 0), tick=1e-3, law=None):
     """Errors (K, 3) and integrals (K, 3) of p'' = a + push under the kernel's law."""
     gains = fine_gains(tick=tick) if law is None else law
-    control_states, bodies = new_control_states(UP), new_bodies(np.array([place], float), UP)
+    control_states, bodies = new_control_states(UP), new_bodies(np.array([position], float), UP)
     bodies["velocity_map"] = velocity
     errors, integrals = [], []
     for _ in range(round(seconds / tick)):
@@ -77,9 +77,9 @@ def test_the_kernel_answers_as_its_poles(axis):
     data = F450.model_dump()
     data["control"] = {"horizontal": poles, "height": poles}
     law = fine_gains(Airframe.model_validate(data))
-    place = np.zeros(3)
-    place[axis] = 0.1
-    errors, _ = double_integrator(8.0, place, law=law)
+    position = np.zeros(3)
+    position[axis] = 0.1
+    errors, _ = double_integrator(8.0, position, law=law)
     wn, zeta, ki, e = poles.values()
     monic = np.polymul([e * e, 2 * zeta * wn * e, wn * wn], [e, ki]) / e**3
     system = np.array([[0, 1, 0], [0, 0, 1], -monic[:0:-1]])
@@ -150,8 +150,8 @@ def test_the_reference_is_feasible_and_arrives(goal):
         seen.append(
             [*control_state["position"], *control_state["velocity"], *control_state["acceleration"]]
         )
-    place, velocity, acceleration = np.split(np.array(seen), 3, axis=1)
-    np.testing.assert_allclose(place[-1], goal, atol=1e-3)
+    position, velocity, acceleration = np.split(np.array(seen), 3, axis=1)
+    np.testing.assert_allclose(position[-1], goal, atol=1e-3)
     assert np.hypot(*velocity[:, :2].T).max() < 1.02 * row["speed"]
     assert velocity[:, 2].max() < 1.02 * row["climb"]
     assert velocity[:, 2].min() > -1.02 * row["descent"]
@@ -159,14 +159,14 @@ def test_the_reference_is_feasible_and_arrives(goal):
     assert np.abs(acceleration[:, 2]).max() < 1.0001 * row["climb_acceleration"]
     jerk = np.diff(acceleration, axis=0) / tick
     assert np.hypot(*jerk[:, :2].T).max() < 1.0001 * row["acceleration"] * row["ease"]
-    step = place[:-1] + tick * velocity[:-1] + 0.5 * tick**2 * acceleration[:-1]
-    np.testing.assert_allclose(place[1:], step, atol=1e-9)
+    step = position[:-1] + tick * velocity[:-1] + 0.5 * tick**2 * acceleration[:-1]
+    np.testing.assert_allclose(position[1:], step, atol=1e-9)
     if goal != (-2, 0, 0):
-        way = place @ np.array(goal, float) / np.linalg.norm(goal)
-        assert way.max() < np.linalg.norm(goal) + 0.02
+        along = position @ np.array(goal, float) / np.linalg.norm(goal)
+        assert along.max() < np.linalg.norm(goal) + 0.02
 
 
-def test_a_reference_waits_for_who_is_held_back():
+def test_a_reference_waits_for_a_uav_that_is_held_back():
     gains = gains_of(F450, 1e-3)
     control_states, bodies = new_control_states(UP), new_bodies(np.zeros((1, 3)), UP)
     control_states["position_target"] = (50, 0, 20)

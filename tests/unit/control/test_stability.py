@@ -20,7 +20,7 @@ def with_body(name, **body):
 @pytest.mark.parametrize("name", airframe_names())
 def test_airframes_that_ship_are_far_from_the_limit(name):
     worst = terms_of(load_airframe(name), RigidBody(), 0.005, 70.0)[0]
-    assert worst.share < 0.1 * STABLE_BELOW
+    assert worst.fraction < 0.1 * STABLE_BELOW
     check_stability(load_airframe(name), RigidBody(), 0.005)
 
 

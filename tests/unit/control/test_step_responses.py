@@ -1,4 +1,4 @@
-"""How the controlled F450 moves: each number here is a promise to whoever plans flights."""
+"""How the controlled F450 moves: each number here is a promise to planners of flights."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from volery.vehicle.airframe import Airframe
 
 def test_hover_stands_still():
     fleet = in_air()
-    place, velocity, tilt = track(fleet, 5.0)
-    np.testing.assert_allclose(place, np.broadcast_to([0, 0, 50], place.shape), atol=1e-6)
+    position, velocity, tilt = track(fleet, 5.0)
+    np.testing.assert_allclose(position, np.broadcast_to([0, 0, 50], position.shape), atol=1e-6)
     assert np.abs(velocity).max() < 1e-6
     assert tilt.max() < 1e-6
 
@@ -24,16 +24,16 @@ def test_position_step(step):
     fleet = in_air()
     target = np.array([0, 0, 50.0]) + step
     fleet.command_position(0, target)
-    place, _, _ = track(fleet, 12.0)
+    position, _, _ = track(fleet, 12.0)
     step = np.array(step, float)
     length = np.linalg.norm(step)
-    way = place - [0, 0, 50]
-    along = way @ step / length
+    offset = position - [0, 0, 50]
+    along = offset @ step / length
     assert along.max() < 1.1 * length
-    late = place[500:]
+    late = position[500:]
     assert np.linalg.norm(late - target, axis=1).max() < 0.25
-    assert np.linalg.norm(way - np.outer(along, step / length), axis=1).max() < 0.6
-    np.testing.assert_allclose(place[-1], target, atol=0.02)
+    assert np.linalg.norm(offset - np.outer(along, step / length), axis=1).max() < 0.6
+    np.testing.assert_allclose(position[-1], target, atol=0.02)
     assert fleet.mode(0) is FlightMode.HOLD
 
 
@@ -62,10 +62,10 @@ def test_speed_is_limited_but_its_direction_kept():
     assert tilt.max() < np.radians(F450.limits.tilt_deg + 2.0)
 
 
-def test_place_is_kept_in_wind():
+def test_position_is_kept_in_wind():
     fleet = in_air()
-    place, velocity, _ = track(fleet, 15.0, wind=(6.0, -2.0, 0.5))
-    np.testing.assert_allclose(place[-1], [0, 0, 50], atol=0.02)
+    position, velocity, _ = track(fleet, 15.0, wind=(6.0, -2.0, 0.5))
+    np.testing.assert_allclose(position[-1], [0, 0, 50], atol=0.02)
     assert np.linalg.norm(velocity[-1]) < 0.01
 
 
@@ -74,8 +74,8 @@ def test_twist_turns_with_the_vehicle():
     fleet = in_air()
     fleet.set_command_timeout(60.0)
     fleet.command_velocity_body(0, (2.0, 0.0, 0.0), 0.5)
-    place, _, _ = track(fleet, 30.0)
-    circle = place[-1257:]  # one turn
+    position, _, _ = track(fleet, 30.0)
+    circle = position[-1257:]  # one turn
     centre = circle[:, :2].mean(axis=0)
     radius = np.linalg.norm(circle[:, :2] - centre, axis=1)
     assert radius.mean() == pytest.approx(4.0, rel=0.05)
@@ -137,10 +137,10 @@ def test_thrust_command_is_in_newtons():
 
 def test_upside_down_recovers():
     fleet = Fleet([F450], [[0, 0, 100.0]], [rotations.from_rpy(np.pi - 0.01, 0.0, 0.4)])
-    place, _, tilt = track(fleet, 10.0)
+    position, _, tilt = track(fleet, 10.0)
     assert tilt[-1] < 0.01
-    assert place[:, 2].min() > 60.0
-    np.testing.assert_allclose(place[-1], [0, 0, 100], atol=0.1)
+    assert position[:, 2].min() > 60.0
+    np.testing.assert_allclose(position[-1], [0, 0, 100], atol=0.1)
 
 
 @pytest.mark.parametrize("count", [6, 8])
@@ -151,9 +151,9 @@ def test_own_airframes_fly(count):
     track(fleet, 2.0)
     np.testing.assert_allclose(fleet.state.position_map[0], [0, 0, 50], atol=1e-6)
     fleet.command_position(0, (5, 0, 50), yaw=1.0)
-    place, _, _ = track(fleet, 12.0)
-    assert place[:, 0].max() < 5.5
-    np.testing.assert_allclose(place[-1], (5, 0, 50), atol=0.05)
+    position, _, _ = track(fleet, 12.0)
+    assert position[:, 0].max() < 5.5
+    np.testing.assert_allclose(position[-1], (5, 0, 50), atol=0.05)
 
 
 def test_a_file_may_override_bandwidths():

@@ -49,7 +49,7 @@ def test_samples_are_met_exactly():
     flown = evaluated(made, TIMES)
     np.testing.assert_allclose(flown[:, :3, 0], PLACE, atol=1e-12)
     np.testing.assert_allclose(flown[:, 3, 1], [0, 1, 2, 0], atol=1e-12)
-    assert made.at(1.5).yaw == pytest.approx(2 * np.pi - 3.0)  # the short way from 3 to -3
+    assert made.at(1.5).yaw == pytest.approx(2 * np.pi - 3.0)  # the short turn from 3 to -3
 
 
 def test_between_samples_as_scipy_has_it():
@@ -136,30 +136,30 @@ def lemniscate(t, rate=0.8):
     )
 
 
-def tracking_error(way, how):
+def tracking_error(course, how):
     """Root mean square, m, of an F450 from 6 s to 18 s."""
-    fleet = Fleet([F450], [way(0.0)[0]], [LEVEL])
+    fleet = Fleet([F450], [course(0.0)[0]], [LEVEL])
     if how == "trajectory":
         t = np.arange(0, 18.01, 0.25)
-        fleet.command_trajectory(0, Trajectory.from_samples(t, *way(t)))
+        fleet.command_trajectory(0, Trajectory.from_samples(t, *course(t)))
     errors = []
     for k in range(900):
-        p, v, a = way(0.02 * k)
+        p, v, a = course(0.02 * k)
         if how == "positions":
             fleet.command_position(0, p)
         elif how == "setpoints":
             fleet.command_setpoint(0, p, v, a)
         fleet.advance(20, FLAT.grid)
-        errors.append(np.linalg.norm(fleet.state.position_map[0] - way(0.02 * (k + 1))[0]))
+        errors.append(np.linalg.norm(fleet.state.position_map[0] - course(0.02 * (k + 1))[0]))
     return np.sqrt(np.mean(np.square(errors[300:])))
 
 
-@pytest.mark.parametrize("way", [circle, lemniscate])
-def test_feed_forward_tracks(way):
+@pytest.mark.parametrize("course", [circle, lemniscate])
+def test_feed_forward_tracks(course):
     """Measured: 2.7 m by positions alone, 0.10 and 0.15 m by setpoints, 0.06 and 0.08 m whole."""
-    assert tracking_error(way, "positions") > 1.5
-    assert tracking_error(way, "setpoints") < 0.18
-    assert tracking_error(way, "trajectory") < 0.10
+    assert tracking_error(course, "positions") > 1.5
+    assert tracking_error(course, "setpoints") < 0.18
+    assert tracking_error(course, "trajectory") < 0.10
 
 
 def test_a_trajectory_ends_in_hold_where_it_ends():

@@ -70,26 +70,26 @@ def test_installations_of_equal_sources_share_compiled_kernels(tmp_path):
     """Two checkouts or virtual environments: what one has compiled, the other loads."""
     env = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
     env.pop("PYTHONPATH", None)
-    told = []
-    for place in (tmp_path / "first", tmp_path / "second"):
-        shutil.copytree(Path(compiled.__file__).parent, place / "volery" / "core")
-        (place / "volery" / "__init__.py").touch()
+    outputs = []
+    for checkout in (tmp_path / "first", tmp_path / "second"):
+        shutil.copytree(Path(compiled.__file__).parent, checkout / "volery" / "core")
+        (checkout / "volery" / "__init__.py").touch()
         done = subprocess.run(
-            [sys.executable, "-P", "-c", _MOVE, str(place)],
+            [sys.executable, "-P", "-c", _MOVE, str(checkout)],
             env=env,
             capture_output=True,
             text=True,
             check=True,
         )
-        told.append(done.stdout.split())
-        assert told[-1][-1] == str(place / "volery" / "__init__.py")
-    assert told[0][:4] == ["-1.0", "-2.0", "3.0", "0"]
-    assert told[1][:4] == ["-1.0", "-2.0", "3.0", "1"]
+        outputs.append(done.stdout.split())
+        assert outputs[-1][-1] == str(checkout / "volery" / "__init__.py")
+    assert outputs[0][:4] == ["-1.0", "-2.0", "3.0", "0"]
+    assert outputs[1][:4] == ["-1.0", "-2.0", "3.0", "1"]
 
 
 def test_kernels_of_other_files_are_kept_apart_by_path(tmp_path):
-    places = [tmp_path / name / "mine.py" for name in ("a", "b")]
-    subpaths = {KernelLocator.get_suitable_cache_subpath(str(place)) for place in places}
+    paths = [tmp_path / name / "mine.py" for name in ("a", "b")]
+    subpaths = {KernelLocator.get_suitable_cache_subpath(str(path)) for path in paths}
     assert len(subpaths) == 2
 
 

@@ -10,7 +10,7 @@ A, B = 6_378_137.0, 6_356_752.314245
 """Semi-axes of WGS-84 (NIMA TR 8350.2)."""
 
 
-def places(count=2000, seed=5):
+def positions(count=2000, seed=5):
     rng = np.random.default_rng(seed)
     low, high = [-np.pi / 2, -np.pi, -5_000.0], [np.pi / 2, np.pi, 400_000.0]
     return rng.uniform(low, high, (count, 3))
@@ -18,7 +18,7 @@ def places(count=2000, seed=5):
 
 def test_surface_points_lie_on_the_ellipsoid_with_the_stated_normal():
     """The latitude is the angle of the surface's normal, which is the gradient of its equation."""
-    geodetic = places()
+    geodetic = positions()
     geodetic[:, 2] = 0.0
     x, y, z = geodesy.ecef_from_geodetic(geodetic).T
     np.testing.assert_allclose((x**2 + y**2) / A**2 + z**2 / B**2, 1.0, atol=1e-14)
@@ -37,7 +37,7 @@ def test_known_points():
 
 
 def test_round_trip_is_exact_to_a_nanometre_scale():
-    geodetic = places()
+    geodetic = positions()
     back = geodesy.geodetic_from_ecef(geodesy.ecef_from_geodetic(geodetic))
     np.testing.assert_allclose(back[:, :2], geodetic[:, :2], atol=1e-14)
     np.testing.assert_allclose(back[:, 2], geodetic[:, 2], atol=2e-8)

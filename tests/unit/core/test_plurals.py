@@ -6,7 +6,7 @@ from volery.core.plurals import counted
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "text"),
     [
         ((0, "scan"), "0 scans"),
         ((1, "scan"), "1 scan"),
@@ -15,5 +15,5 @@ from volery.core.plurals import counted
         ((2, "entry", "entries"), "2 entries"),
     ],
 )
-def test_one_is_singular(words, told):
-    assert counted(*words) == told
+def test_one_is_singular(words, text):
+    assert counted(*words) == text

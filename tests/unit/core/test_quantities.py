@@ -50,7 +50,7 @@ def test_a_key_without_a_unit_has_none():
         ("fraction", 1.5, "1.5 is beyond 0 to 1"),
     ],
 )
-def test_what_is_beyond_is_told(key, value, words):
+def test_what_is_beyond_is_reported(key, value, words):
     assert words in fault_in(key, value, low=0.0, positive=key == "mass_kg")
 
 

@@ -40,8 +40,8 @@ def _sum(a, b):
 
 
 @kernel
-def _is_outside(a, least, most):
-    return any_outside(lanes_at(a, 0), lanes_at(least, 0), most)
+def _is_outside(a, low, high):
+    return any_outside(lanes_at(a, 0), lanes_at(low, 0), high)
 
 
 def test_lanes_calculate_element_by_element():
@@ -64,8 +64,8 @@ def test_totals_are_the_sums_over_the_lanes():
 @pytest.mark.parametrize("lane", range(LANES))
 def test_one_lane_outside_is_enough(lane):
     values = np.zeros(LANES)
-    least = np.full(LANES, -1.0)
-    assert not _is_outside(values, least, 1.0)
+    low = np.full(LANES, -1.0)
+    assert not _is_outside(values, low, 1.0)
     for beyond in (-1.5, 1.5, np.nan):
         values[lane] = beyond
-        assert _is_outside(values, least, 1.0)
+        assert _is_outside(values, low, 1.0)

@@ -158,7 +158,7 @@ def test_after_the_end_commands_fail_and_say_why(bench):
     assert bench.done == []
 
 
-def test_a_command_that_fails_tells_its_sender_alone(bench):
+def test_a_command_that_fails_is_reported_to_its_sender_alone(bench):
     client = bench.inbox.open_queue()
     broken = client.post(lambda: 1 / 0)
     fine = client.post(lambda: 7)

@@ -55,7 +55,7 @@ class Flight:
 
 
 @pytest.mark.parametrize("speed", [1.0, 25.0, 60.0])
-def test_a_thin_pane_is_hit_at_any_speed_at_the_right_place(speed):
+def test_a_thin_pane_is_hit_at_any_speed_at_the_right_position(speed):
     pane = RADIUS + 0.3  # near: without control, drag above its centre tips a slow vehicle back
     flight = Flight([[0, 0, 0]], [[speed, 0, 0]], solids=[wall(pane)])
     flight.run(3000)
@@ -106,6 +106,6 @@ def test_a_crowd_never_overlaps_unnoticed(seed):
     positions *= max(1.0, 1.0 / apart.min())
     flight = Flight(positions, generator.uniform(-8, 8, (12, 3)))
     flight.run(800)
-    # Brute force over the looks: whoever came closer than two radii was reported.
+    # Brute force over the looks: each pair closer than two radii was reported.
     assert (flight.nearest_pair < 2 * RADIUS - 1e-3) <= bool(flight.events)
     assert flight.nearest_pair > 2 * RADIUS - 0.1

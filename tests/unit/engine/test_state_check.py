@@ -54,7 +54,7 @@ def test_nothing_that_is_not_finite_happens(flying):
     assert all(map(math.isfinite, [x for e in flying.diagnostics.events for x in e.position_map]))
 
 
-def test_an_error_that_nan_causes_is_told_as_such(flying):
+def test_an_error_that_nan_causes_is_reported_as_such(flying):
     def fail():
         flying._engine.fleet.state.velocity_map[0] = math.nan
         round(math.nan)

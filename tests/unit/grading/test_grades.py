@@ -26,7 +26,7 @@ def flight(seed, *, contact=True, arrives=True, problem="", name="ann"):
     return GradedFlight(name, seed, () if problem else verdicts, "ab" * 32, problem)
 
 
-def test_points_are_the_share_of_flights_that_pass():
+def test_points_are_the_fraction_of_flights_that_pass():
     grade = Grade("ann", (flight(1), flight(2, arrives=False), flight(3, arrives=False)), POINTS)
     assert grade.points == {"no contact": 1.0, "arrives": pytest.approx(1.0)}
     assert grade.total == pytest.approx(2.0)

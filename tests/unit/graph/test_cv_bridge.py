@@ -26,7 +26,7 @@ def image(pixels, encoding):
         (np.array([[1, 65535]], np.uint16), "mono16"),
     ],
 )
-def test_both_ways(pixels, encoding):
+def test_both_directions(pixels, encoding):
     message = image(pixels, encoding)
     assert (message.encoding, message.height, message.width) == (encoding, *pixels.shape[:2])
     back = BRIDGE.imgmsg_to_cv2(message)
@@ -34,7 +34,7 @@ def test_both_ways(pixels, encoding):
     np.testing.assert_array_equal(back, pixels)
 
 
-def test_colours_change_places():
+def test_colours_are_reordered():
     message = image(COLOURS, "rgb8")
     np.testing.assert_array_equal(BRIDGE.imgmsg_to_cv2(message, "bgr8"), COLOURS[:, :, ::-1])
     np.testing.assert_array_equal(BRIDGE.imgmsg_to_cv2(message, "rgb8"), COLOURS)
@@ -64,11 +64,11 @@ def test_passthrough_names_the_type():
 
 def test_compressed():
     flat = np.full((16, 16, 3), (10, 100, 200), np.uint8)  # blue, green, red
-    for form, most in (("png", 0), ("jpg", 4)):
+    for form, tolerance in (("png", 0), ("jpg", 4)):
         message = BRIDGE.cv2_to_compressed_imgmsg(flat, form)
         assert message.format == form
         found = BRIDGE.compressed_imgmsg_to_cv2(message)
-        assert np.abs(found.astype(int) - flat).max() <= most
+        assert np.abs(found.astype(int) - flat).max() <= tolerance
         red_first = BRIDGE.compressed_imgmsg_to_cv2(message, "rgb8")
         np.testing.assert_array_equal(red_first, found[:, :, ::-1])
     grey = BRIDGE.cv2_to_compressed_imgmsg(flat[:, :, 0], "png")

@@ -77,24 +77,24 @@ def scenario(flat_data):
 
 
 def listen(simulation):
-    heard = []
+    received = []
 
     def on_thought(published):
         stamp, seen_at, count = map(int, published.message.data.split())
-        heard.append((stamp, seen_at, published.time_ns, count))
+        received.append((stamp, seen_at, published.time_ns, count))
 
     simulation.graph.subscribe("/uav1/thought", on_thought)
-    return heard
+    return received
 
 
 def test_output_comes_after_the_latency(simulate, scenario):
     simulation = simulate(scenario(Thinker, LATENCY_NS / 1e9))
-    heard = listen(simulation)
+    received = listen(simulation)
     simulation.run(0.4)
-    stamps = [stamp for stamp, *_ in heard]
+    stamps = [stamp for stamp, *_ in received]
     assert stamps == [k * ODOM_PERIOD_NS for k in range(len(stamps))]
     assert len(stamps) == 1 + (400_000_000 - LATENCY_NS) // ODOM_PERIOD_NS
-    for stamp, seen_at, released_at, _ in heard:
+    for stamp, seen_at, released_at, _ in received:
         assert seen_at == stamp
         assert released_at == stamp + LATENCY_NS
     (node,) = simulation.vehicles.nodes
@@ -103,9 +103,9 @@ def test_output_comes_after_the_latency(simulate, scenario):
 
 def test_node_without_latency_answers_at_once(simulate, scenario):
     simulation = simulate(scenario(Thinker, 0.0))
-    heard = listen(simulation)
+    received = listen(simulation)
     simulation.run(0.1)
-    assert all(stamp == seen == released for stamp, seen, released, _ in heard)
+    assert all(stamp == seen == released for stamp, seen, released, _ in received)
     assert simulation.vehicles.nodes[0].threads == {threading.current_thread().name}
 
 
@@ -151,7 +151,7 @@ def test_waiting_for_a_service_is_refused(simulate, scenario):
         simulation.run(0.2)
 
 
-def test_failure_is_told_with_its_time(simulate, scenario):
+def test_failure_is_reported_with_its_time(simulate, scenario):
     simulation = simulate(scenario(Broken, 0.05))
     with pytest.raises(NodeError, match=r"/uav1/thinker failed at 0\.000 s .* ValueError: no idea"):
         simulation.run(0.2)
@@ -159,14 +159,14 @@ def test_failure_is_told_with_its_time(simulate, scenario):
 
 def test_snapshot_holds_thoughts_not_yet_spoken(simulate, scenario):
     simulation = simulate(scenario(Slow, LATENCY_NS / 1e9))
-    heard = listen(simulation)
+    received = listen(simulation)
     simulation.run(0.1)
     kept = simulation.snapshot()
-    told = len(heard)
+    count = len(received)
     simulation.run(0.2)
-    first = heard[told:]
+    first = received[count:]
     simulation.restore(kept)
-    told = len(heard)
+    count = len(received)
     simulation.run(0.2)
-    assert heard[told:] == first
+    assert received[count:] == first
     assert len(first) == 10

@@ -87,7 +87,7 @@ def test_types_load_on_demand(name: str) -> None:
 
 
 def test_type_hash_of_a_standard_service_part() -> None:
-    """The same definition gives the same hash by another way."""
+    """The same definition gives the same hash in another type store."""
     ours = typestore().hash_rihs01("mavros_msgs/msg/ParamValue")
     other = get_typestore(Stores.ROS2_JAZZY)
     other.register(get_types_from_msg("int64 integer\nfloat64 real", "mavros_msgs/msg/ParamValue"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import GraphError
-from volery.graph.graph import MOST_UNUSED, Graph
+from volery.graph.graph import MAX_UNUSED, Graph
 from volery.graph.messages import LaserScan, String, Twist, header, message_type
 from volery.graph.typestore import typestore
 
@@ -28,7 +28,7 @@ def test_delivery_keeps_order_even_when_callbacks_publish(graph):
     assert got == ["1", "2", "reply", "reply"]
 
 
-def test_unwanted_messages_are_not_queued_and_wanted_tells(graph):
+def test_unwanted_messages_are_not_queued_and_publishers_know_their_subscribers(graph):
     publisher = graph.advertise("/a", String)
     assert not publisher.has_subscribers
     subscription = graph.subscribe("/a", lambda _m: None)
@@ -68,7 +68,7 @@ def texts(got):
 def test_a_late_subscriber_gets_the_last_latched_message_once(timed, clock):
     latched = timed.advertise("/map", String, latched=True)
     plain = timed.advertise("/map", String)
-    assert latched.has_subscribers  # though nobody listens yet
+    assert latched.has_subscribers  # though it has none yet
     for word in ("old", "new"):
         latched.publish(String(word))
     plain.publish(String("gone"))
@@ -87,7 +87,7 @@ def test_a_late_subscriber_gets_the_last_latched_message_once(timed, clock):
     assert (info.latched, info.messages, info.subscribers) == (True, 3, 2)
 
 
-def test_what_is_under_way_comes_after_what_was_kept(timed):
+def test_messages_in_transit_come_after_the_latched_one(timed):
     latched = timed.advertise("/map", String, latched=True)
     latched.publish(String("1"))
     timed.deliver()
@@ -175,25 +175,25 @@ def test_a_call_without_a_request_is_one_of_zeros(graph):
 def test_topics_that_come_and_go_do_not_pile_up(graph):
     stays = graph.advertise("/stays", String)
     graph.advertise("/idle", String).cancel()
-    for k in range(2 * MOST_UNUSED):
+    for k in range(2 * MAX_UNUSED):
         graph.advertise(f"/t{k}", String).cancel()
         graph.subscribe(f"/s{k}", lambda _: None, String).cancel()
-        if k == 3:  # is among those that nobody uses, and is used again
+        if k == 3:  # is among the unused, and is used again
             back = graph.advertise("/idle", String)
     names = {t.name for t in graph.topics()}
     assert {"/stays", "/idle"} <= names
-    assert len(names) == MOST_UNUSED + 2
+    assert len(names) == MAX_UNUSED + 2
     assert graph.topic_type("/t0") is None
-    graph.advertise("/t0", Twist)  # whoever comes next may choose another type
+    graph.advertise("/t0", Twist)  # the next publisher may choose another type
     for one in (stays, back):
         one.cancel()
-    assert f"/s{2 * MOST_UNUSED - 1}" in names
+    assert f"/s{2 * MAX_UNUSED - 1}" in names
 
 
-def test_what_was_latched_on_the_way_goes_with_its_publisher(graph):
+def test_a_latched_message_in_transit_goes_with_its_publisher(graph):
     graph.subscribe("/a", lambda _: None, String)
     publisher = graph.advertise("/a", String, latched=True)
-    publisher.publish(String("under way"))
+    publisher.publish(String("in transit"))
     publisher.cancel()
     graph.deliver()
     late = []
@@ -224,7 +224,7 @@ def test_what_is_shown_reaches_clients_outside_alone(timed):
     ]
     subscription.cancel()
     assert not publisher.has_external_subscribers
-    publisher.publish_external(String("nobody"))
+    publisher.publish_external(String("none"))
     assert len(outside) == 2
     with pytest.raises(GraphError, match="carries"):
         publisher.publish_external(Twist(None, None))

@@ -104,7 +104,7 @@ def test_definitions_are_spelled_as_in_ros1(tmp_path):
 
 @pytest.mark.parametrize("package", ["volery_interfaces", "simulation_interfaces", "std_srvs"])
 def test_definitions_of_ros1_mean_the_same(tmp_path, package):
-    """Read again as files of the user's own they have the sums that the bridge tells."""
+    """Read again as files of the user's own they have the sums that the bridge sends."""
     codec = ros1_codec()
     write_package(package, tmp_path, ros1=True)
     for file in find_definition_files(tmp_path / package):

@@ -1,4 +1,4 @@
-"""Tests messages as plain JSON values, both ways, and the rejection of invalid values."""
+"""Tests messages as plain JSON values, in both directions, and the rejection of invalid values."""
 
 from __future__ import annotations
 
@@ -157,8 +157,8 @@ def test_whole_floats_are_integers() -> None:
     assert decode_plain({"data": 5.0}, "std_msgs/msg/Int8").data == 5
     array = decode_plain({"data": [1, 2.0]}, "std_msgs/msg/Int64MultiArray").data
     assert array.tolist() == [1, 2]
-    most = decode_plain({"data": [2**64 - 1, 0]}, "std_msgs/msg/UInt64MultiArray").data
-    assert most.tolist() == [2**64 - 1, 0]
+    integers = decode_plain({"data": [2**64 - 1, 0]}, "std_msgs/msg/UInt64MultiArray").data
+    assert integers.tolist() == [2**64 - 1, 0]
 
 
 REFUSED: list[tuple[str, Any, str]] = [

@@ -44,24 +44,24 @@ def node():
 
 
 def test_equal_stamps_meet_in_any_order(pair):
-    left, right, heard = pair
+    left, right, received = pair
     both = TimeSynchronizer([left, right], 10)
-    both.registerCallback(lambda a, b, word: heard.append((*times_of(a, b), word)), "extra")
+    both.registerCallback(lambda a, b, word: received.append((*times_of(a, b), word)), "extra")
     for time_ms in (10, 20, 30):
         left.signalMessage(stamped(time_ms))
     for time_ms in (30, 10, 40):
         right.signalMessage(stamped(time_ms))
-    assert heard == [(30, 30, "extra"), (10, 10, "extra")]
+    assert received == [(30, 30, "extra"), (10, 10, "extra")]
 
 
 def test_a_queue_keeps_the_newest(pair):
-    left, right, heard = pair
-    TimeSynchronizer([left, right], 2).registerCallback(lambda a, b: heard.append(times_of(a)))
+    left, right, received = pair
+    TimeSynchronizer([left, right], 2).registerCallback(lambda a, b: received.append(times_of(a)))
     for time_ms in (10, 20, 30):
         left.signalMessage(stamped(time_ms))
     for time_ms in (10, 20, 30):
         right.signalMessage(stamped(time_ms))
-    assert heard == [(20,), (30,)]
+    assert received == [(20,), (30,)]
 
 
 def test_exact_times_need_a_header(pair):
@@ -72,36 +72,36 @@ def test_exact_times_need_a_header(pair):
 
 
 def test_near_stamps_meet_the_nearest_first(pair):
-    left, right, heard = pair
+    left, right, received = pair
     both = ApproximateTimeSynchronizer([left, right], 10, 0.02)
-    both.registerCallback(lambda a, b: heard.append(times_of(a, b)))
+    both.registerCallback(lambda a, b: received.append(times_of(a, b)))
     for time_ms in (100, 112, 200):
         left.signalMessage(stamped(time_ms))
     right.signalMessage(stamped(110))
     right.signalMessage(stamped(115))
     right.signalMessage(stamped(220))  # a difference of slop is too much
     right.signalMessage(stamped(219))
-    assert heard == [(112, 110), (100, 115), (200, 219)]
+    assert received == [(112, 110), (100, 115), (200, 219)]
 
 
 def test_three_inputs_all_within_the_slop():
-    inputs, heard = [SimpleFilter() for _ in range(3)], []
+    inputs, received = [SimpleFilter() for _ in range(3)], []
     every = ApproximateTimeSynchronizer(inputs, 10, 0.02)
-    every.registerCallback(lambda *messages: heard.append(times_of(*messages)))
+    every.registerCallback(lambda *messages: received.append(times_of(*messages)))
     inputs[0].signalMessage(stamped(100))
     inputs[1].signalMessage(stamped(125))
     inputs[2].signalMessage(stamped(112))  # near both, which are too far apart
-    assert heard == []
+    assert received == []
     inputs[1].signalMessage(stamped(111))
-    assert heard == [(100, 111, 112)]
+    assert received == [(100, 111, 112)]
 
 
 def test_subscribers_of_a_node_and_messages_without_header(node):
-    heard, cached = [], []
+    received, cached = [], []
     point = Subscriber(node, PointStamped, "point", qos_profile=5)
     text = Subscriber(node, String, "text")
     both = ApproximateTimeSynchronizer([point, text], 5, 0.1, allow_headerless=True)
-    both.registerCallback(lambda a, b: heard.append((times_of(a), b.data)))
+    both.registerCallback(lambda a, b: received.append((times_of(a), b.data)))
     Cache(text, 3).registerCallback(cached.append)  # ignores messages without header
     points = node.create_publisher(PointStamped, "point")
     texts = node.create_publisher(String, "text")
@@ -109,7 +109,7 @@ def test_subscribers_of_a_node_and_messages_without_header(node):
     texts.publish(String("at arrival"))
     points.publish(stamped(1_000))
     node._context.graph.deliver()
-    assert heard == [((1_000,), "at arrival")]
+    assert received == [((1_000,), "at arrival")]
     assert cached == []
     assert (point.getTopic(), text.topic) == ("point", "text")
     text.unsubscribe()
@@ -117,14 +117,14 @@ def test_subscribers_of_a_node_and_messages_without_header(node):
 
 
 def test_all_by_the_time_of_arrival(node):
-    heard = []
+    received = []
     inputs = [Subscriber(node, PointStamped, name) for name in ("a", "b")]
     both = ApproximateTimeSynchronizer(inputs, 5, 0.1, sync_arrival_time=True)
-    both.registerCallback(lambda a, b: heard.append(times_of(a, b)))
+    both.registerCallback(lambda a, b: received.append(times_of(a, b)))
     for name, time_ms in (("a", 0), ("b", 9_000)):
         node.create_publisher(PointStamped, name).publish(stamped(time_ms))
     node._context.graph.deliver()
-    assert heard == [(0, 9_000)]
+    assert received == [(0, 9_000)]
 
 
 def test_a_cache_is_asked_by_time():

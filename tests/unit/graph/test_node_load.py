@@ -22,7 +22,7 @@ class _NoTimers:
 
 
 class Busy(Node):
-    """Computes for as much CPU time as it is told, then sleeps as long."""
+    """Computes for as much CPU time as a message says, then sleeps as long."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("busy", **options)

@@ -95,9 +95,9 @@ def test_snapshots_hold_what_timers_do(made):
 
 def test_handles_can_be_destroyed(made):
     simulation, node = made
-    heard = []
+    received = []
     publisher = node.create_publisher(String, "text", 10)
-    subscription = node.create_subscription(String, "text", lambda m: heard.append(m.data), 10)
+    subscription = node.create_subscription(String, "text", lambda m: received.append(m.data), 10)
     assert publisher.get_subscription_count() == 1
     assert publisher.topic_name == subscription.topic_name == "/uav1/text"
     publisher.publish(String(data="a"))
@@ -105,7 +105,7 @@ def test_handles_can_be_destroyed(made):
     assert node.destroy_subscription(subscription)
     publisher.publish(String(data="b"))
     simulation.run(0.01)
-    assert heard == ["a"]
+    assert received == ["a"]
     assert node.destroy_publisher(publisher)
     service = node.create_service("std_srvs/srv/Trigger", "do", lambda _q, response: response)
     client = node.create_client("std_srvs/srv/Trigger", "do")

@@ -50,7 +50,7 @@ def receive(node, callback):
 
 def test_a_callback_awaits_a_service(node):
     node.create_service(TRIGGER, "ask", lambda request, response: answered(response))
-    client, heard = node.create_client(TRIGGER, "ask"), []
+    client, received = node.create_client(TRIGGER, "ask"), []
 
     def answered(response):
         response.message = "yes"
@@ -58,23 +58,23 @@ def test_a_callback_awaits_a_service(node):
 
     async def on_text(message):
         response = await client.call_async()
-        heard.append((message.data, response.message))
+        received.append((message.data, response.message))
 
     receive(node, on_text)
-    assert heard == [("go", "yes")]
+    assert received == [("go", "yes")]
 
 
 def test_a_callback_goes_on_when_its_future_is_done(node):
-    future, heard = Future(), []
+    future, received = Future(), []
 
     async def on_text(message):
-        heard.append("before")
-        heard.append(await future)
+        received.append("before")
+        received.append(await future)
 
     receive(node, on_text)
-    assert heard == ["before"]
+    assert received == ["before"]
     future.set_result("after")
-    assert heard == ["before", "after"]
+    assert received == ["before", "after"]
 
 
 def test_failures_after_an_await_name_the_callback(node):
@@ -137,24 +137,24 @@ def moved(child, time_ns=7, x=2.0):
 
 
 def test_waiting_for_a_transform(node):
-    buffer, heard = Buffer(node=node), []
+    buffer, received = Buffer(node=node), []
 
     async def on_text(message):
         found = await buffer.lookup_transform_async("map", "probe")
-        heard.append(found.transform.translation.x)
+        received.append(found.transform.translation.x)
 
     receive(node, on_text)
     future = buffer.wait_for_transform_async("map", "probe", None)
     buffer.set_transform(moved("other"))
-    assert (heard, future.done()) == ([], False)
+    assert (received, future.done()) == ([], False)
     buffer.set_transform(moved("probe"))
-    assert (heard, future.result()) == ([2.0], True)
+    assert (received, future.result()) == ([2.0], True)
     assert buffer.wait_for_transform_async("map", "probe", None).done()
 
 
 def test_a_transform_that_is_there_is_reported_after_the_callback(node):
     """Callbacks take locks, which the report takes too."""
-    soon, lock, heard = [], threading.Lock(), []
+    soon, lock, received = [], threading.Lock(), []
     node._context.timers.at = lambda time_ns, action: soon.append((time_ns, action))
     buffer = Buffer()
     TransformListener(buffer, node)
@@ -162,7 +162,7 @@ def test_a_transform_that_is_there_is_reported_after_the_callback(node):
 
     def on_ready(future):
         with lock:
-            heard.append(future.result())
+            received.append(future.result())
 
     def on_text(message):
         with lock:
@@ -171,7 +171,7 @@ def test_a_transform_that_is_there_is_reported_after_the_callback(node):
     receive(node, on_text)
     ((time_ns, report),) = soon
     report()
-    assert (time_ns, heard) == (7, [True])
+    assert (time_ns, received) == (7, [True])
 
 
 def test_frames_as_yaml():
@@ -186,17 +186,17 @@ def test_frames_as_yaml():
 
 
 def test_values_are_reported_after_they_are_set(node):
-    heard = []
+    received = []
 
     def on_set(settings):
-        heard.append([(setting.name, setting.value) for setting in settings])
+        received.append([(setting.name, setting.value) for setting in settings])
 
     node.add_post_set_parameters_callback(on_set)
     node.declare_parameter("speed", 1.0)
     node.set_parameters([ParameterSetting("speed", value=2)])
     node.set_parameters([ParameterSetting("speed", value="fast")])  # is refused
     node._context.graph.parameters.get("/idioms", "speed").set(3.0)
-    assert heard == [[("speed", 1.0)], [("speed", 2)], [("speed", 3.0)]]
+    assert received == [[("speed", 1.0)], [("speed", 2)], [("speed", 3.0)]]
 
 
 def test_a_callback_before_a_value_is_set_may_add_others(node):
@@ -280,24 +280,24 @@ def test_other_missing_modules_stay_missing():
 
 
 def test_a_callback_with_two_arguments_receives_the_times_too(node):
-    heard = []
-    node.create_subscription(String, "text", lambda message, info: heard.append(info), 1)
-    node.create_subscription(String, "text", lambda message, more=3: heard.append(more), 1)
-    node.create_subscription(String, "text", heard.append, 1)
+    received = []
+    node.create_subscription(String, "text", lambda message, info: received.append(info), 1)
+    node.create_subscription(String, "text", lambda message, more=3: received.append(more), 1)
+    node.create_subscription(String, "text", received.append, 1)
     node.create_publisher(String, "text").publish(String("go"))
     node._context.graph.deliver()
-    info, more, message = heard
+    info, more, message = received
     assert (info["source_timestamp"], info["received_timestamp"]) == (7, 7)
     assert (more, message.data) == (3, "go")
 
 
 def test_a_callback_may_be_replaced(node):
-    heard = []
+    received = []
     subscription = node.create_subscription(String, "text", print, 1)
-    subscription.callback = lambda message, info: heard.append(message.data)
+    subscription.callback = lambda message, info: received.append(message.data)
     node.create_publisher(String, "text").publish(String("go"))
     node._context.graph.deliver()
-    assert heard == ["go"]
+    assert received == ["go"]
     assert subscription.get_publisher_count() == 1
 
 
@@ -415,11 +415,11 @@ def test_requests_of_another_service_are_refused(node):
 
 
 def test_a_received_sequence_cannot_grow(node):
-    heard = []
-    node.create_subscription(LaserScan, "scan", heard.append, 1)
+    received = []
+    node.create_subscription(LaserScan, "scan", received.append, 1)
     node.create_publisher(LaserScan, "scan").publish(LaserScan(ranges=[1.0, 2.0]))
     node._context.graph.deliver()
-    ranges = heard[0].ranges
+    ranges = received[0].ranges
     with pytest.raises(AttributeError, match="its length is fixed"):
         ranges.append(3.0)
     assert (ranges == [1.0, 2.0], ranges != [1.0, 2.0]) == (False, True)  # as `array.array`

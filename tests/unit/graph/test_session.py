@@ -1,4 +1,4 @@
-"""Tests clients in other threads: sessions, subscription queues, services both ways."""
+"""Tests clients in other threads: sessions, subscription queues, services in both directions."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def bench():
 
 
 def quiet():
-    """A wake that nobody needs."""
+    """A wake that does nothing."""
 
 
 def texts(queue):
     return [published.message.data for published in queue.take()]
 
 
-def test_messages_go_both_ways(bench):
+def test_messages_go_in_both_directions(bench):
     session, wakes = bench.gateway.open("client"), []
     queue = session.subscribe("/out", STRING, wake=lambda: wakes.append(1))
     seen = []
@@ -69,16 +69,16 @@ def test_a_reliable_queue_keeps_all(bench):
     assert queue.failure is None
 
 
-@pytest.mark.parametrize("limit", ["MOST_DEPTH", "MOST_RELIABLE_BYTES"])
+@pytest.mark.parametrize("limit", ["MAX_DEPTH", "MAX_RELIABLE_BYTES"])
 def test_a_reliable_queue_that_overflows_says_so_and_ends(bench, monkeypatch, limit):
     monkeypatch.setattr(
-        f"volery.graph.subscription_queue.{limit}", {"MOST_DEPTH": 20}.get(limit, 2000)
+        f"volery.graph.subscription_queue.{limit}", {"MAX_DEPTH": 20}.get(limit, 2000)
     )
     wakes = []
     session = bench.gateway.open("slow")
     queue = session.subscribe("/out", STRING, reliable=True, wake=lambda: wakes.append(1))
     publisher = bench.graph.advertise("/out", STRING)
-    for _ in range(3):  # as long as somebody takes them, any number may come
+    for _ in range(3):  # as long as the client takes them, any number may come
         for _ in range(19):
             publisher.publish(String("x" * 100))
         bench.work_off()
@@ -156,7 +156,7 @@ def test_a_service_of_one_client_for_another(bench):
         bench.graph.call("/do")
 
 
-def test_who_leaves_fails_those_who_wait_for_him(bench):
+def test_a_server_that_leaves_fails_the_waiting_calls(bench):
     server, failures, requests = bench.gateway.open("server"), [], []
     server.create_service("/do", TRIGGER, lambda request, reply: requests.append(reply))
     bench.gateway.open("caller").call("/do", None, ServiceReply(print, failures.append))
@@ -180,7 +180,7 @@ def test_closing_takes_everything_back(bench):
     assert bench.gateway.sessions() == []
     counts = {t.name: (t.publishers, t.subscribers) for t in bench.graph.topics()}
     assert counts == {"/in": (0, 0), "/out": (0, 0)}
-    bench.graph.advertise("/out", STRING).publish(String("nobody"))
+    bench.graph.advertise("/out", STRING).publish(String("late"))
     bench.work_off()
     assert texts(queue) == []
     with pytest.raises(GraphError, match="has left"):
@@ -206,12 +206,12 @@ def test_what_cannot_be_is_refused(bench, attempt, words):
 
 def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     publisher = bench.graph.advertise("/out", STRING, latched=True)
-    stop, problem, most = threading.Event(), [], 3000
+    stop, problem, num_messages = threading.Event(), [], 3000
 
     def visit():
         while not stop.is_set():
             session = bench.gateway.open("visitor")
-            queue = session.subscribe("/out", STRING, depth=most, wake=quiet)
+            queue = session.subscribe("/out", STRING, depth=num_messages, wake=quiet)
             numbers = [int(text) for text in texts(queue)]
             session.close()
             numbers += [int(text) for text in texts(queue)]
@@ -221,7 +221,7 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     threads = [threading.Thread(target=visit) for _ in range(3)]
     for thread in threads:
         thread.start()
-    for k in range(most):
+    for k in range(num_messages):
         publisher.publish(String(str(k)))
         bench.graph.deliver()
     stop.set()
@@ -230,7 +230,7 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     assert not problem
 
 
-def test_last_words_of_who_leaves_are_heard(bench):
+def test_the_last_messages_of_a_client_that_leaves_are_received(bench):
     """`volery topic pub --once` publishes and leaves, faster than a tick."""
     seen = []
     bench.graph.subscribe("/in", seen.append, STRING)
@@ -246,8 +246,8 @@ def test_last_words_of_who_leaves_are_heard(bench):
     assert not late
 
 
-def test_who_was_commanded_from_outside(bench, monkeypatch):
-    monkeypatch.setattr("volery.graph.session._MOST_NAMES", 2)
+def test_uavs_that_external_clients_command_are_noted(bench, monkeypatch):
+    monkeypatch.setattr("volery.graph.session._MAX_NAMES", 2)
     session, gateway = bench.gateway.open("client"), bench.gateway
     bench.graph.advertise("/uav1/inside", STRING).publish(message_type(STRING)("x"))
     bench.work_off()
@@ -262,7 +262,7 @@ def test_who_was_commanded_from_outside(bench, monkeypatch):
     assert gateway.commands == 5
 
 
-def test_losses_of_those_who_left_count(bench):
+def test_losses_of_clients_that_left_count(bench):
     session = bench.gateway.open("slow")
     publisher = bench.graph.advertise("/fast", STRING)
     for _ in range(2):

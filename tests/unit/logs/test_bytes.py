@@ -105,13 +105,13 @@ class Timers:
 
 
 def test_a_bag_with_negative_bytes_is_replayed(tmp_path):
-    timers, heard = Timers(), []
+    timers, received = Timers(), []
     graph = Graph(lambda: timers.now_ns)
-    graph.subscribe_all(heard.append)
+    graph.subscribe_all(received.append)
     Replay(write(tmp_path / "a.bag", "bag")).start(graph, timers, lambda: timers.now_ns)
     timers.run(graph)
-    assert [(p.message.b, p.message.two.tolist()) for p in heard] == [(v, [v, 1]) for v in BYTES]
-    assert [p.cdr[4] for p in heard] == [0xFF, 0x7F, 0x80]
+    assert [(p.message.b, p.message.two.tolist()) for p in received] == [(v, [v, 1]) for v in BYTES]
+    assert [p.cdr[4] for p in received] == [0xFF, 0x7F, 0x80]
 
 
 def test_a_graph_records_and_reads_bytes_of_either_generation(tmp_path):

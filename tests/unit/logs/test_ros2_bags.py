@@ -233,7 +233,7 @@ def test_a_folder_of_any_name(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["flight", "flight.db3.active", "flight.bag"])
-def test_the_content_tells_the_format(tmp_path, name):
+def test_the_content_identifies_the_format(tmp_path, name):
     path = tmp_path / name
     shutil.copy(_file(write_sqlite_bag(tmp_path / "bag")), path)
     with open_log(path) as log:
@@ -242,12 +242,12 @@ def test_the_content_tells_the_format(tmp_path, name):
     assert (result.exit_code, "format    ROS 2 bag" in result.stdout) == (0, True)
 
 
-@pytest.mark.parametrize("share", [0.6, 0.8])
-def test_a_file_that_is_cut_off_is_read_up_to_there(tmp_path, share):
+@pytest.mark.parametrize("fraction", [0.6, 0.8])
+def test_a_file_that_is_cut_off_is_read_up_to_there(tmp_path, fraction):
     """As a full disk leaves it; SQLite itself refuses it."""
     path = _file(write_sqlite_bag(tmp_path / "bag"))
     data = path.read_bytes()
-    path.write_bytes(data[: int(share * len(data))])
+    path.write_bytes(data[: int(fraction * len(data))])
     with pytest.warns(LogWarning, match=r"bag\.db3 is cut off or damaged, the rest is not read"):
         log = open_log(path)
     with log:
@@ -363,7 +363,7 @@ def test_a_bag_is_played_from_any_time(tmp_path, kind):
             (path / "metadata.yaml").unlink()
             problem = "metadata.yaml is missing"
         path = _file(path) if kind == "file" else path
-    heard = []
+    received = []
     with one_file(path) as whole, closing(Playback(whole.path)) as playback:
         assert problem in whole.problem
         assert bool(whole.problem) == bool(problem)
@@ -371,12 +371,12 @@ def test_a_bag_is_played_from_any_time(tmp_path, kind):
         assert counts["/note"] == COUNT * (2 if kind == "two mcap" else 1)
         graph = Graph(lambda: playback.now_ns)
         playback.open(graph)
-        graph.subscribe("/note", lambda p: heard.append(p.message.data), m.String)
+        graph.subscribe("/note", lambda p: received.append(p.message.data), m.String)
         for time_ns in (1_500_000_000, 300_000_000):
             playback.seek(time_ns)
             graph.deliver()
         copy = whole.path
-    assert heard == ["note 15", "note 3"]
+    assert received == ["note 15", "note 3"]
     assert copy.exists() == (kind in ("mcap", "log"))
 
 

@@ -139,7 +139,7 @@ def test_a_log_that_is_damaged_in_the_middle(path, whole, garbage):
     assert log["/odd"]["step"].tolist() == [-k for k in range(50)]
 
 
-def test_two_damaged_places_and_lost_bytes(path, whole):
+def test_two_damaged_records_and_lost_bytes(path, whole):
     parts = [part for sample in samples() for part in (sample, SYNC)]
     parts[20] = parts[20][:-7]  # the length of the message leads into the next one
     parts[80] = b"\xf0\xff" + parts[80][2:]  # its length leads far beyond the end
@@ -243,7 +243,7 @@ def test_no_ulog_and_unknown_features(path):
 
 
 @pytest.mark.parametrize("name", ["flight.ulog", "flight", "flight.bin"])
-def test_the_content_tells_the_format(path, name):
+def test_the_content_identifies_the_format(path, name):
     with open_log(path.rename(path.with_name(name))) as log:
         assert len(log["/odd"]) == 50
 

@@ -18,9 +18,9 @@ def irises(count=1):
 
 
 class SilenceClock:
-    """In the place of the lock step's `time`: passes only while `autopilot` is silent for good.
+    """Replaces the lock step's `time`: passes only while `autopilot` is silent for good.
 
-    So a stand-in whose answer a busy machine delays does not count as silent.
+    So a stand-in whose response a busy machine delays does not count as silent.
     """
 
     def __init__(self, monkeypatch):

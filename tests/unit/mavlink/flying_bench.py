@@ -48,18 +48,18 @@ class Station:
         self._parser, self._framer = Parser(), Framer()
         self.deaf = False
         """Whether it passes over everything, to be quick."""
-        self.heard = []
+        self.received = []
         """Messages, the oldest first."""
         graph = simulation.graph
         self._out = graph.advertise(f"/{uav}/mavlink/in", PACKETS)
-        graph.subscribe(f"/{uav}/mavlink/out", self._hear, PACKETS)
+        graph.subscribe(f"/{uav}/mavlink/out", self._receive, PACKETS)
         self.send_bytes(b"")  # the link is there
 
-    def _hear(self, published):
+    def _receive(self, published):
         if published.message.link == self.link and not self.deaf:
             frames = self._framer.datagram(bytes(published.message.data))
-            told = [self._parser.decode(frame.data) for frame in frames]
-            self.heard += filter(None, told)  # of those that pymavlink knows
+            decoded = [self._parser.decode(frame.data) for frame in frames]
+            self.received += filter(None, decoded)  # of those that pymavlink knows
 
     def send(self, name, *fields):
         message = getattr(dialect(), f"MAVLink_{name}_message")(*fields)
@@ -78,11 +78,11 @@ class Station:
         self.simulation.run(seconds)
 
     def of(self, kind):
-        return [message for message in self.heard if message.get_type() == kind]
+        return [message for message in self.received if message.get_type() == kind]
 
     def last(self, kind):
         found = self.of(kind)
-        assert found, f"no {kind}; heard {sorted({m.get_type() for m in self.heard})}"
+        assert found, f"no {kind}; received {sorted({m.get_type() for m in self.received})}"
         return found[-1]
 
     @property
@@ -108,7 +108,7 @@ class Station:
     def mode(self, main, sub=0):
         return self.command(176, 1.0, float(main), float(sub))
 
-    def tell_it_is_there(self):
+    def send_heartbeat(self):
         """Send the heartbeat of a ground station."""
         self.send("heartbeat", 6, 8, 0, 0, 4, 3)
 
@@ -126,14 +126,14 @@ class Station:
             kind, carried = 6, float(np.array(value, np.int32).view(np.float32))
         before = len(self.of("PARAM_VALUE"))
         self.send("param_set", self.target, 1, name.encode(), carried, kind)
-        told = [m for m in self.of("PARAM_VALUE")[before:] if m.param_id == name]
-        if not told:
+        values = [m for m in self.of("PARAM_VALUE")[before:] if m.param_id == name]
+        if not values:
             return None
-        value = told[-1].param_value
-        whole = told[-1].param_type == 6
+        value = values[-1].param_value
+        whole = values[-1].param_type == 6
         return int(np.array(value, np.float32).view(np.int32)) if whole else value
 
-    def place(self, x, y, z, mask=2552, yaw=0.0, frame=1):
+    def send_position(self, x, y, z, mask=2552, yaw=0.0, frame=1):
         """A local setpoint, NED."""
         fields = (0, self.target, 1, frame, mask, x, y, z, 0, 0, 0, 0, 0, 0, yaw, 0)
         self.send("set_position_target_local_ned", *fields)

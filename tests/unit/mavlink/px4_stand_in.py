@@ -55,15 +55,15 @@ class Terminal:
 
 
 class StandIn(threading.Thread):
-    """Connects at once; answers `answers` times with `throttle`, armed from the `arm_at`-th on.
+    """Connects at once; responds `num_responses` times with `throttle`, armed from `arm_at` on.
 
-    With `dozes` it then hears so many readings without a word, and answers as often again.
+    With `dozes` it then receives so many samples without a word, and responds as often again.
     """
 
     def __init__(
         self,
         port,
-        answers,
+        num_responses,
         *,
         throttle=0.0,
         arm_at=0,
@@ -73,7 +73,7 @@ class StandIn(threading.Thread):
         link=None,
     ):
         super().__init__(daemon=True)
-        self.port, self.answers = port, answers
+        self.port, self.num_responses = port, num_responses
         self.throttle, self.arm_at = throttle, arm_at
         self.falls_silent, self.in_lock_step = falls_silent, in_lock_step
         self.dozes = dozes
@@ -91,11 +91,11 @@ class StandIn(threading.Thread):
 
     def run(self):
         try:
-            self._fly(self.answers)
+            self._fly(self.num_responses)
             if self.dozes:
                 for _ in range(self.dozes):
                     self._check(self._next_sensor())
-                self._fly(self.answers)
+                self._fly(self.num_responses)
             if not self.falls_silent:
                 self._link.close()
         except Exception as fault:
@@ -107,10 +107,10 @@ class StandIn(threading.Thread):
     def close(self):
         self._link.close()
 
-    def _fly(self, answers):
-        for number in range(answers):
+    def _fly(self, num_responses):
+        for number in range(num_responses):
             self._check(self._next_sensor())
-            self._answer(number)
+            self._respond(number)
 
     def _next_sensor(self):
         while True:
@@ -129,7 +129,7 @@ class StandIn(threading.Thread):
             self._check_fix(message)
 
     def _check(self, sensor):
-        if self.in_lock_step and len(self.sensors) > 1:  # before the first answer it runs freely
+        if self.in_lock_step and len(self.sensors) > 1:  # before the first response it runs freely
             assert sensor.time_usec - self.sensors[-1].time_usec == PERIOD_US, "a step is missing"
         fields = sensor.fields_updated
         for group in WHOLE_GROUPS:
@@ -153,7 +153,7 @@ class StandIn(threading.Thread):
         assert fix.cog == 65535 or fix.cog < 36000
         self.fixes.append(fix)
 
-    def _answer(self, number):
+    def _respond(self, number):
         armed = number >= self.arm_at
         controls = [self.throttle if armed else 0.0] * 4 + [0.0] * 12
         time_us = self.sensors[-1].time_usec

@@ -22,7 +22,7 @@ from volery.mavlink.hil.ardupilot_json import (
     State,
     motors_of,
     parse_servos,
-    shares,
+    rotor_fractions,
     state_line,
 )
 from volery.mavlink.hil.lock_step import TimeoutPolicy
@@ -106,11 +106,11 @@ def test_several_have_ports_of_their_own(opened):
     meet(simulation, bridge, 2)
     simulation.run(0.2)
     finish(*autopilots)
-    places = [autopilot.states[0]["", "position"] for autopilot in autopilots]
-    assert places[1][1] - places[0][1] == pytest.approx(5.0, abs=0.1)
+    positions = [autopilot.states[0]["", "position"] for autopilot in autopilots]
+    assert positions[1][1] - positions[0][1] == pytest.approx(5.0, abs=0.1)
 
 
-def test_one_that_was_restarted_is_met_anew(opened):
+def test_a_restarted_ardupilot_joins_again(opened):
     simulation, bridge = opened()
     for first in (5, 0):
         autopilot = ArdupilotStandIn(bridge.ports[0], 80, first=first)
@@ -135,7 +135,7 @@ def test_it_flies_on_after_a_reset(opened):
     assert autopilot.jumps == 1
 
 
-def test_who_is_silent_ends_the_run_or_is_given_up(opened, monkeypatch, caplog):
+def test_a_silent_ardupilot_ends_the_run_or_is_given_up(opened, monkeypatch, caplog):
     silence = SilenceClock(monkeypatch)
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.3))
     silence.autopilot = autopilot = ArdupilotStandIn(bridge.ports[0], 5)
@@ -156,7 +156,7 @@ def test_who_is_silent_ends_the_run_or_is_given_up(opened, monkeypatch, caplog):
     assert bridge.connected == ()
 
 
-def test_what_was_lost_is_said_again(opened):
+def test_lost_messages_are_sent_again(opened):
     simulation, bridge = opened()
     autopilot = ArdupilotStandIn(bridge.ports[0], 1)
     autopilot.link.settimeout(60.0)
@@ -165,7 +165,7 @@ def test_what_was_lost_is_said_again(opened):
     run = threading.Thread(target=simulation.run, args=(0.0022,))
     run.start()
     first = autopilot.link.recv(65000)
-    autopilot.send(0)  # as one that has not heard it
+    autopilot.send(0)  # as one that has not received it
     assert autopilot.link.recv(65000) == first
     autopilot.send(1)
     run.join(60.0)
@@ -173,7 +173,7 @@ def test_what_was_lost_is_said_again(opened):
     autopilot.link.close()
 
 
-def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, monkeypatch, caplog):
+def test_noise_and_a_second_one_are_reported_and_ignored(opened, monkeypatch, caplog):
     now = SimpleNamespace(monotonic=lambda: 100.0)  # else a slow stand-in counts as gone
     monkeypatch.setattr("volery.mavlink.hil.ardupilot_bridge.time", now)
     simulation, bridge = opened()
@@ -199,7 +199,7 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, monkeypatch,
     ]
 
 
-def test_a_frame_that_comes_late_begins_nothing_anew(opened):
+def test_a_late_frame_restarts_nothing(opened):
     simulation, bridge = opened()
     autopilot = ArdupilotStandIn(bridge.ports[0], 1)
     autopilot.link.settimeout(60.0)
@@ -235,7 +235,7 @@ def test_the_line_is_as_its_reader_wants_it():
     )
 
 
-def test_its_clock_of_whole_microseconds_keeps_the_pace():
+def test_its_clock_of_whole_microseconds_does_not_drift():
     """As SIM_JSON reads it: what is added to a count of microseconds is cut to a whole one."""
     clock_us, last_s = 0, 0.0
     for k in range(1, 100_001):
@@ -264,7 +264,7 @@ def test_motors_follow_the_arms():
         RotorPosition(0, -1, "ccw"),
     ]
     assert motors_of(plus) == (2, 1, 3, 0)
-    assert shares([1000, 1500, 2100, 900], (1, 0, 3, 2)) == [0.5, 0.0, 0.0, 1.0]
+    assert rotor_fractions([1000, 1500, 2100, 900], (1, 0, 3, 2)) == [0.5, 0.0, 0.0, 1.0]
 
 
 def test_arms_that_arducopter_does_not_fly():
@@ -279,14 +279,14 @@ def test_arms_that_arducopter_does_not_fly():
         motors_of(six)
 
 
-def test_a_port_that_is_taken_is_told():
+def test_a_port_that_is_taken_is_reported():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
         simulation = Simulation(scenario(1), threads=1)
         with simulation, BridgeHost(simulation.gateway) as bridges:
-            with pytest.raises(BridgeError) as told:
+            with pytest.raises(BridgeError) as error:
                 bridges.open(ArdupilotBridge(port=port))
-            assert str(told.value) == (
+            assert str(error.value) == (
                 f"uav1: cannot listen on UDP 127.0.0.1:{port}: the port is taken"
             )

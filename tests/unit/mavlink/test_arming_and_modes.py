@@ -1,4 +1,4 @@
-"""Arming, take-off, landing, holding, returning: what a ground station asks for first."""
+"""Arming, take-off, landing, holding, returning: the first commands of a ground station."""
 
 import math
 
@@ -97,7 +97,7 @@ def test_disarming_in_the_air_takes_force_and_lets_it_fall(flight):
 def test_is_not_armed_in_modes_that_only_come_down(flight, command, mode):
     _, station = flight
     assert station.command(command) == ACCEPTED
-    for force in (0.0, 21196.0):  # which PX4 hears from nobody outside
+    for force in (0.0, 21196.0):  # which PX4 accepts from no external client
         assert station.command(ARM, 1.0, force) == REJECTED
     assert "Arming denied: mode not suitable for arming" in station.texts
     assert station.present_mode == mode
@@ -172,15 +172,15 @@ def test_repositions_above_sea_and_keeps_what_is_nan(flight):
 def test_a_reposition_without_its_flag_does_not_leave_another_mode(flight, flags):
     _, station = flight
     station.up(3.0)
-    place = (47.397742 + math.degrees(20.0 / 6.37e6), 8.545594, 488.0 + 6.0)
+    position = (47.397742 + math.degrees(20.0 / 6.37e6), 8.545594, 488.0 + 6.0)
     assert station.command(RETURN) == ACCEPTED
-    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == DENIED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *position) == DENIED
     station.seconds(1.0)
     assert station.present_mode == (4, 5)
     assert station.mode(4, 3) == ACCEPTED
-    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *place) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, flags, 0.0, NAN, *position) == ACCEPTED
     assert station.command(RETURN) == ACCEPTED
-    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, *place) == ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, *position) == ACCEPTED
     assert station.present_mode == (4, 3)
 
 
@@ -190,9 +190,9 @@ def test_returns_at_the_height_that_is_set(flight):
     station.set("RTL_DESCEND_ALT", 4.0)
     station.set("RTL_MIN_DIST", 2.0)
     station.up(3.0)
-    station.stream(0.3, station.place, 0.0, 6.0, -3.0)
+    station.stream(0.3, station.send_position, 0.0, 6.0, -3.0)
     assert station.mode(6) == ACCEPTED
-    station.stream(4.0, station.place, 0.0, 6.0, -3.0)
+    station.stream(4.0, station.send_position, 0.0, 6.0, -3.0)
     assert station.command(RETURN) == ACCEPTED
     highest, low = 0.0, []
     for _ in range(60):
@@ -208,15 +208,15 @@ def test_returns_at_the_height_that_is_set(flight):
 
 
 @pytest.mark.parametrize(
-    ("north", "place"), [(0.0, (473977420, 85455940)), (60_000.0, (479373904, 85455940))]
+    ("north", "position"), [(0.0, (473977420, 85455940)), (60_000.0, (479373904, 85455940))]
 )
-def test_home_is_told_as_it_was_set_and_arming_keeps_it(flight, north, place):
+def test_home_is_sent_as_it_was_set_and_arming_keeps_it(flight, north, position):
     _, station = flight
-    station.send("command_int", 1, 1, 0, SET_HOME, 0, 0, 0.0, NAN, NAN, NAN, *place, 500.0)
+    station.send("command_int", 1, 1, 0, SET_HOME, 0, 0, 0.0, NAN, NAN, NAN, *position, 500.0)
     assert station.last("COMMAND_ACK").result == ACCEPTED
     for _ in range(2):
         home = station.last("HOME_POSITION")
-        assert (home.latitude, home.longitude, home.altitude) == (*place, 500_000)
+        assert (home.latitude, home.longitude, home.altitude) == (*position, 500_000)
         assert home.z == pytest.approx(-12.0, abs=0.2)
         assert home.x == pytest.approx(north, rel=2e-3, abs=0.1)
         assert station.command(ARM, 1.0) == ACCEPTED
@@ -226,7 +226,7 @@ def test_home_is_told_as_it_was_set_and_arming_keeps_it(flight, north, place):
 
 
 @pytest.mark.parametrize(
-    "place",
+    "position",
     [
         (0.0, 0.0, 0.0),
         (-47.397742, -171.454406, 488.0),  # on the other side of the earth
@@ -235,11 +235,11 @@ def test_home_is_told_as_it_was_set_and_arming_keeps_it(flight, north, place):
         (95.0, 8.5, 488.0),
     ],
 )
-def test_a_home_that_the_map_cannot_hold_is_denied(flight, place):
+def test_a_home_that_the_map_cannot_hold_is_denied(flight, position):
     _, station = flight
     station.command(512, 242.0)
     before = station.last("HOME_POSITION")
-    assert station.command(SET_HOME, 0.0, NAN, NAN, NAN, *place) == DENIED
+    assert station.command(SET_HOME, 0.0, NAN, NAN, NAN, *position) == DENIED
     station.command(512, 242.0)
     after = station.last("HOME_POSITION")
     assert (after.latitude, after.altitude) == (before.latitude, before.altitude)
@@ -260,7 +260,7 @@ def test_cruising_speed_is_that_of_the_parameter(flight):
     assert math.hypot(*simulation.uavs["uav1"].velocity_map[:2]) == pytest.approx(5.0, abs=0.3)
 
 
-def test_tells_who_else_flies_it(flight):
+def test_other_controllers_are_reported(flight):
     simulation, station = flight
     simulation.uavs["uav1"].take_off(2.0)
     station.seconds(0.2)

@@ -1,4 +1,4 @@
-"""What is said of autopilots that nobody has started."""
+"""Warnings about autopilots that are not running."""
 
 import time
 
@@ -39,7 +39,7 @@ def notices(caplog):
     return [text for text in caplog.messages if "yet for" in text]
 
 
-def heard(caplog, simulation):
+def notices_of_run(caplog, simulation):
     """Notices of a run in real time, up to the first one and for three times as long as it took."""
     end = time.monotonic() + 60.0
     while not notices(caplog) and time.monotonic() < end:
@@ -48,18 +48,18 @@ def heard(caplog, simulation):
     return notices(caplog)
 
 
-def test_missing_px4s_are_told_of_once_while_time_goes_on(opened, caplog):
+def test_missing_px4s_are_reported_once_while_time_goes_on(opened, caplog):
     bridge = Px4Bridge(port=0, notice_s=SOON_S)
     simulation, _ = opened(with_px4(irises(2)), bridge)
     first, second = bridge.ports
-    assert heard(caplog, simulation) == [
+    assert notices_of_run(caplog, simulation) == [
         f"no PX4 yet for uav1 (127.0.0.1:{first}), uav2 (127.0.0.1:{second}): they stay on the "
         "ground until one connects; PX4's instances connect to ports 4560 and following"
     ]
     assert simulation.time_s >= 3.0 * SOON_S
 
 
-def test_only_those_are_told_of_that_are_missing(opened, caplog):
+def test_only_missing_px4s_are_reported(opened, caplog):
     bridge = Px4Bridge(port=0, notice_s=NEVER_S)
     opened(with_px4(irises(2)), bridge)
     with connect(bridge.ports[0]):
@@ -67,15 +67,15 @@ def test_only_those_are_told_of_that_are_missing(opened, caplog):
         while not bridge.connected and time.monotonic() < end:
             time.sleep(0.01)
         bridge._absence._look()
-        (told,) = notices(caplog)
-    assert f"uav2 (127.0.0.1:{bridge.ports[1]}): it stays on the ground" in told
-    assert "uav1" not in told
+        (warning,) = notices(caplog)
+    assert f"uav2 (127.0.0.1:{bridge.ports[1]}): it stays on the ground" in warning
+    assert "uav1" not in warning
 
 
 @pytest.mark.parametrize(("port", "more"), [(4560, ""), (4570, " --first 10")])
 def test_the_hint_names_instances_that_connect_there(port, more):
-    told = how_to_start(3, port)
-    assert told == f"start with: volery px4 --px4-dir PX4-Autopilot --count 3{more}"
+    warning = how_to_start(3, port)
+    assert warning == f"start with: volery px4 --px4-dir PX4-Autopilot --count 3{more}"
 
 
 def test_nothing_is_said_by_a_bridge_that_closes_before_or_is_not_to(opened, caplog):
@@ -90,27 +90,27 @@ def test_nothing_is_said_by_a_bridge_that_closes_before_or_is_not_to(opened, cap
     assert notices(caplog) == []
 
 
-def test_missing_ardupilots_are_told_of(opened, caplog):
+def test_missing_ardupilots_are_reported(opened, caplog):
     bridge = ArdupilotBridge(port=0, notice_s=SOON_S)
     simulation, _ = opened(with_ardupilot(irises()), bridge)
-    (told,) = heard(caplog, simulation)
-    assert told.startswith(
+    (warning,) = notices_of_run(caplog, simulation)
+    assert warning.startswith(
         f"no ArduPilot yet for uav1 (UDP 127.0.0.1:{bridge.ports[0]}): it stays on the ground"
     )
-    assert "start with: arducopter --model JSON" in told
+    assert "start with: arducopter --model JSON" in warning
 
 
-def test_a_silent_serial_line_is_told_of(opened, caplog):
+def test_a_silent_serial_line_is_reported(opened, caplog):
     terminal = Terminal()
     bridge = Px4SerialBridge(terminal.path, notice_s=SOON_S)
     simulation, _ = opened(with_px4(irises()), bridge)
-    (told,) = heard(caplog, simulation)
-    assert told.startswith(f"no PX4 yet for uav1 ({terminal.path} at 921600 baud): it stays")
-    assert "SYS_HITL = 1" in told
+    (warning,) = notices_of_run(caplog, simulation)
+    assert warning.startswith(f"no PX4 yet for uav1 ({terminal.path} at 921600 baud): it stays")
+    assert "SYS_HITL = 1" in warning
 
 
 def test_of_many_three_are_named():
-    places = {f"uav{k}": f"127.0.0.1:{4559 + k}" for k in range(1, 51)}
-    told = notice("PX4", places, "start them")
-    assert told.startswith("no PX4 yet for uav1 (127.0.0.1:4560), uav2 ")
-    assert "uav3 (127.0.0.1:4562) and 47 more: they stay on the ground" in told
+    addresses = {f"uav{k}": f"127.0.0.1:{4559 + k}" for k in range(1, 51)}
+    warning = notice("PX4", addresses, "start them")
+    assert warning.startswith("no PX4 yet for uav1 (127.0.0.1:4560), uav2 ")
+    assert "uav3 (127.0.0.1:4562) and 47 more: they stay on the ground" in warning

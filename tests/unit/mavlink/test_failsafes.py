@@ -43,7 +43,7 @@ DEGREE = math.degrees(1.0 / 6.37e6)
 
 
 def reposition(station, north, height=2.0):
-    """Result of COMMAND_INT 192 to a place `north` of home."""
+    """Result of COMMAND_INT 192 to a position `north` of home."""
     x, y = round((47.397742 + north * DEGREE) * 1e7), round(8.545594 * 1e7)
     before = len(station.of("COMMAND_ACK"))
     fields = (1, 1, 6, 192, 0, 0, -1.0, 1.0, 0.0, math.nan, x, y, height)
@@ -52,12 +52,12 @@ def reposition(station, north, height=2.0):
     return ack.result
 
 
-def test_a_hold_by_failsafe_ends_the_way_to_a_place(flight):
+def test_a_hold_by_failsafe_ends_the_flight_to_a_position(flight):
     simulation, station = flight
     station.up(2.0)
     assert reposition(station, 60.0) == ACCEPTED
     station.seconds(3.0)
-    station.set("GF_MAX_HOR_DIST", 5.0)  # a fence that comes when it is on its way beyond
+    station.set("GF_MAX_HOR_DIST", 5.0)  # a geofence that is set while it flies beyond it
     station.seconds(4.0)
     assert "Geofence violation: maximum distance from home" in station.texts
     stopped = simulation.uavs["uav1"].position_map[1]
@@ -67,13 +67,13 @@ def test_a_hold_by_failsafe_ends_the_way_to_a_place(flight):
     assert reposition(station, 2.0) == ACCEPTED  # back inside
 
 
-def test_a_hold_for_a_lost_ground_station_ends_the_way_to_a_place(flight):
+def test_a_hold_for_a_lost_ground_station_ends_the_flight_to_a_position(flight):
     simulation, station = flight
     station.set("NAV_DLL_ACT", 1)
     station.set("COM_DL_LOSS_T", 5)
-    station.tell_it_is_there()
+    station.send_heartbeat()
     station.up(2.0)
-    station.tell_it_is_there()
+    station.send_heartbeat()
     assert reposition(station, 200.0) == ACCEPTED
     station.seconds(8.5)
     stopped = simulation.uavs["uav1"].position_map[1]
@@ -81,7 +81,7 @@ def test_a_hold_for_a_lost_ground_station_ends_the_way_to_a_place(flight):
     assert simulation.uavs["uav1"].position_map[1] == pytest.approx(stopped, abs=0.3)
 
 
-def test_a_place_beyond_the_fence_is_refused(flight):
+def test_a_position_beyond_the_geofence_is_refused(flight):
     simulation, station = flight
     circle = (5003, 0, (20.0, 0.0, 0.0, 0.0), 47.397742, 8.545594, 0.0)
     assert station.upload([circle], 1) == ACCEPTED
@@ -91,7 +91,7 @@ def test_a_place_beyond_the_fence_is_refused(flight):
     station.seconds(1.0)
     assert abs(simulation.uavs["uav1"].position_map[1]) < 0.5
     assert reposition(station, 10.0) == ACCEPTED
-    station.set("GF_ACTION", 1)  # a fence that only tells
+    station.set("GF_ACTION", 1)  # a geofence that only warns
     assert reposition(station, 60.0) == ACCEPTED
 
 
@@ -100,8 +100,8 @@ def test_a_polygon_to_stay_in_and_a_circle_to_stay_out(flight):
     stretch = DEGREE / math.cos(math.radians(47.397742))
 
     def corner(command, first, north, east):
-        place = (47.397742 + north * DEGREE, 8.545594 + east * stretch)
-        return command, 0, (first, 0.0, 0.0, 0.0), *place, 0.0
+        position = (47.397742 + north * DEGREE, 8.545594 + east * stretch)
+        return command, 0, (first, 0.0, 0.0, 0.0), *position, 0.0
 
     box = [corner(5001, 4.0, n, e) for n, e in ((-5, -5), (5, -5), (5, 5), (-5, 5))]
     assert station.upload(box, 1) == ACCEPTED
@@ -120,9 +120,9 @@ def test_a_lost_ground_station_is_acted_on(flight, action, mode):
     _, station = flight
     station.set("NAV_DLL_ACT", action)
     station.set("COM_DL_LOSS_T", 5)
-    station.tell_it_is_there()
+    station.send_heartbeat()
     station.up(2.0)
-    station.tell_it_is_there()
+    station.send_heartbeat()
     head_north(station, 4.0, speed=0.5)
     assert station.present_mode == (6, 0)
     for _ in range(30):
@@ -132,10 +132,10 @@ def test_a_lost_ground_station_is_acted_on(flight, action, mode):
     assert "Failsafe: connection to ground station lost" in station.texts
     assert station.mode(4, 3) == ACCEPTED
     station.seconds(1.0)
-    assert station.present_mode == HOLD  # who takes over keeps it
+    assert station.present_mode == HOLD  # the operator that takes over keeps control
 
 
-def test_a_ground_station_that_was_never_heard_is_a_lost_one(flight):
+def test_a_ground_station_that_was_never_connected_is_a_lost_one(flight):
     _, station = flight
     station.up(2.0)
     station.set("NAV_DLL_ACT", 2)
@@ -151,7 +151,7 @@ def test_without_its_ground_station_it_is_not_armed_where_that_counts(flight):
     why = "Arming denied: no connection to the ground control station"
     assert station.command(400, 1.0) == 1
     assert station.texts.count(why) == 1
-    station.tell_it_is_there()
+    station.send_heartbeat()
     assert station.command(400, 1.0) == ACCEPTED
     assert station.command(400, 0.0) == ACCEPTED
     station.seconds(5.2)

@@ -117,19 +117,19 @@ def test_a_log_is_that_of_the_flight(flight):
     hover = np.median(topics["actuator_motors"]["control[0]"][20:60])
     assert hover == pytest.approx(log.initial_parameters["MPC_THR_HOVER"], abs=0.05)
     assert np.isnan(topics["actuator_motors"]["control[4]"]).all()
-    place = topics["vehicle_global_position"]
-    assert place["lat"][0] == pytest.approx(47.397742, abs=1e-5)
+    position = topics["vehicle_global_position"]
+    assert position["lat"][0] == pytest.approx(47.397742, abs=1e-5)
     assert "Takeoff detected" in [text.message for text in log.logged_messages]
     assert log.logged_messages[-1].message == "Disarmed by landing"
 
 
-def test_a_log_tells_parameters_and_setpoints(flight):
+def test_a_log_holds_parameters_and_setpoints(flight):
     _, station = flight
     station.up()
     station.set("MPC_XY_CRUISE", 4.0)
-    station.stream(0.5, station.place, 2.0, 1.0, -4.0)
+    station.stream(0.5, station.send_position, 2.0, 1.0, -4.0)
     assert station.mode(6) == 0
-    station.stream(2.0, station.place, 2.0, 1.0, -4.0)
+    station.stream(2.0, station.send_position, 2.0, 1.0, -4.0)
     (entry,) = entries(station)
     log = ULog(io.BytesIO(download(station, entry)))
     assert log.initial_parameters["MPC_XY_CRUISE"] == 5.0
@@ -198,9 +198,9 @@ def test_requests_out_of_range_get_no_data(flight, number, offset, count):
     _, station = flight
     fly_once(station, 1.0)
     entries(station)
-    told = pieces(station, number, offset, count)
-    assert len(told) == (number == 0)  # PX4 ends those of a log with an empty piece
-    assert all(piece.count == 0 for piece in told)
+    received = pieces(station, number, offset, count)
+    assert len(received) == (number == 0)  # PX4 ends those of a log with an empty piece
+    assert all(piece.count == 0 for piece in received)
 
 
 def test_a_flood_of_requests_is_answered_at_the_rate_of_one(flight):
@@ -224,15 +224,15 @@ def test_links_share_the_rate(flight):
     simulation, station = flight
     fly_once(station, 1.0)
     others = [Station(simulation, link=link) for link in range(20, 30)]
-    told = []
+    counts = []
     for one in (station, *others):
         entries(one)
     for one in (station, *others):
         one.send("log_request_data", 1, 1, 0, 0, 0xFFFFFFFF)
     station.seconds(0.11)
-    told = [len(one.of("LOG_DATA")) for one in (station, *others)]
-    assert sum(told) <= 10 * 12
-    assert max(told) - min(told) <= 5
+    counts = [len(one.of("LOG_DATA")) for one in (station, *others)]
+    assert sum(counts) <= 10 * 12
+    assert max(counts) - min(counts) <= 5
 
 
 def test_a_closed_link_leaves_nothing(flight):
@@ -328,7 +328,7 @@ def test_the_file_has_no_name_and_goes_with_its_owner(monkeypatch, tmp_path):
         os.fstat(number)
 
 
-def test_a_log_that_is_full_or_cannot_be_written_is_told_of_once(flight, monkeypatch):
+def test_a_log_that_is_full_or_cannot_be_written_is_reported_once(flight, monkeypatch):
     simulation, station = flight
     (autopilot,) = (node for node in simulation.vehicles.nodes if node.get_name() == "autopilot")
     storage = autopilot.core.context.log.storage
@@ -347,6 +347,6 @@ def test_a_log_that_is_full_or_cannot_be_written_is_told_of_once(flight, monkeyp
     monkeypatch.setattr(log_storage, "_BLOCK_BYTES", 1000)
     monkeypatch.setattr(os, "pwrite", full)
     fly_once(station, 1.0)
-    told = "Flight log cannot be written: No space left on device"
-    assert station.texts.count(told) == 1
+    text = "Flight log cannot be written: No space left on device"
+    assert station.texts.count(text) == 1
     assert entries(station)[0].num_logs == 0

@@ -19,11 +19,13 @@ ORIGINS = [
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_it_agrees_with_the_geodesy_of_all_rooms(origin):
     earth, frame = GeoReference(*origin), LocalFrame.from_degrees(*origin)
-    places = np.random.default_rng(8).uniform(-20_000.0, 20_000.0, (200, 3)) * [1.0, 1.0, 0.05]
-    for place, wanted in zip(places, frame.geodetic_from_enu(places), strict=True):
-        latitude, longitude, altitude = earth.geodetic(tuple(place.tolist()))
+    positions = np.random.default_rng(8).uniform(-20_000.0, 20_000.0, (200, 3)) * [1.0, 1.0, 0.05]
+    for position, wanted in zip(positions, frame.geodetic_from_enu(positions), strict=True):
+        latitude, longitude, altitude = earth.geodetic(tuple(position.tolist()))
         assert math.radians(latitude) == pytest.approx(wanted[0], abs=1e-11)
         turn = math.remainder(math.radians(longitude) - wanted[1], math.tau)
         assert turn == pytest.approx(0.0, abs=1e-11)
         assert altitude == pytest.approx(wanted[2], abs=1e-5)
-        assert earth.place(latitude, longitude, altitude) == pytest.approx(place, abs=1e-4)
+        assert earth.map_position(latitude, longitude, altitude) == pytest.approx(
+            position, abs=1e-4
+        )

@@ -1,4 +1,4 @@
-"""What stations ask of a vehicle beside flying: gripper, calibration, shell, failures."""
+"""Requests of stations beside flying: gripper, calibration, shell, failures."""
 
 import numpy as np
 import pytest
@@ -57,10 +57,10 @@ def test_a_calibration_reports_its_progress(flight, params, sensor):
     assert calibrate(station, *params) == ACCEPTED
     assert calibrate(station, *params) == REJECTED  # one at a time
     station.seconds(2.5)
-    told = [text for text in station.texts if text.startswith("[cal] ")]
-    assert told[0] == f"[cal] calibration started: 2 {sensor}"
-    assert told[1:-1] == [f"[cal] progress <{percent}>" for percent in range(5, 101, 5)]
-    assert told[-1] == f"[cal] calibration done: {sensor}"
+    texts = [text for text in station.texts if text.startswith("[cal] ")]
+    assert texts[0] == f"[cal] calibration started: 2 {sensor}"
+    assert texts[1:-1] == [f"[cal] progress <{percent}>" for percent in range(5, 101, 5)]
+    assert texts[-1] == f"[cal] calibration done: {sensor}"
     assert calibrate(station, *params) == ACCEPTED
 
 
@@ -71,7 +71,7 @@ def test_a_calibration_is_cancelled_refused_and_fails(flight):
     assert calibrate(station) == ACCEPTED
     station.seconds(3.0)
     assert station.texts[-1] == "[cal] calibration cancelled"
-    assert calibrate(station, 0.0, 1.0) == UNSUPPORTED  # who would turn it
+    assert calibrate(station, 0.0, 1.0) == UNSUPPORTED  # no one can turn it
     assert calibrate(station, 1.0) == ACCEPTED
     assert station.command(400, 1.0) == ACCEPTED
     station.seconds(0.5)
@@ -90,9 +90,9 @@ def shell(station, text, flags=2):
 
 def test_the_shell_replies(flight):
     _, station = flight
-    told = shell(station, "help\n")
-    assert "param show" in told
-    assert told.endswith("pxh> ")
+    reply = shell(station, "help\n")
+    assert "param show" in reply
+    assert reply.endswith("pxh> ")
     assert shell(station, "param sho") == ""
     assert "MIS_TAKEOFF_ALT: 2.5" in shell(station, "w MIS_TAKE*\n")
     assert "Invalid command: rm -rf /" in shell(station, "rm -rf /\n")
@@ -195,27 +195,27 @@ def test_motors_work_again():
 
 def test_sensors_work_again():
     simulation, station = fly(sensors=[{"kind": "imu"}, {"kind": "barometer"}])
-    heard = []
+    topics = []
     for topic in ("imu", "pressure"):
-        simulation.graph.subscribe(f"/uav1/{topic}", lambda m, topic=topic: heard.append(topic))
+        simulation.graph.subscribe(f"/uav1/{topic}", lambda m, topic=topic: topics.append(topic))
     with simulation:
         station.seconds(0.5)
         station.set("SYS_FAILURE_EN", 1)
 
-        def told():
-            heard.clear()
+        def published():
+            topics.clear()
             station.seconds(0.5)
-            return set(heard)
+            return set(topics)
 
         for unit in (GYRO, ACCELEROMETER, BAROMETER):
             assert station.command(INJECT, unit, OFF, 0.0) == ACCEPTED
         station.seconds(0.1)
-        assert told() == set()
+        assert published() == set()
         assert station.command(INJECT, BAROMETER, OK, 1.0) == ACCEPTED
         assert station.command(INJECT, GYRO, OK, 0.0) == ACCEPTED
-        assert told() == {"pressure"}  # the accelerometer, of the same sensor, fails on
+        assert published() == {"pressure"}  # the accelerometer, of the same sensor, fails on
         assert station.command(INJECT, ACCELEROMETER, OK, 0.0) == ACCEPTED
-        assert told() == {"imu", "pressure"}
+        assert published() == {"imu", "pressure"}
 
 
 def test_a_receiver_that_is_stuck_or_lost_has_its_fix_again():
@@ -226,17 +226,17 @@ def test_a_receiver_that_is_stuck_or_lost_has_its_fix_again():
         station.seconds(1.0)
         station.set("SYS_FAILURE_EN", 1)
 
-        def told():
+        def num_positions():
             station.seconds(2.0)
             fixes.clear()
             station.seconds(6.0)
             return len({fix.latitude for fix in fixes if fix.status.status >= 0})
 
-        assert told() > 10
+        assert num_positions() > 10
         assert station.command(INJECT, GPS, STUCK, 0.0) == ACCEPTED
-        assert told() == 1
+        assert num_positions() == 1
         assert station.command(INJECT, GPS, OFF, 0.0) == ACCEPTED  # in place of the other
-        assert told() == 0
+        assert num_positions() == 0
         assert station.command(INJECT, GPS, OK, 0.0) == ACCEPTED
-        assert told() > 10
+        assert num_positions() > 10
         assert fix_of(station) == 3

@@ -80,17 +80,17 @@ def test_a_client_is_found_and_answered(client):
     assert value.param_value == 2.5
 
 
-def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
+def test_every_vehicle_has_a_port_and_the_ground_station_receives_all(running):
     second = mavutil.mavlink_connection(f"udpin:127.0.0.1:{running.base + 1}")
     ground = mavutil.mavlink_connection(f"udpin:127.0.0.1:{running.base + 10}")
     try:
         assert second.wait_heartbeat(timeout=60.0).get_srcSystem() == 2
-        heard = set()
+        systems = set()
         end = time.monotonic() + 60.0
-        while heard != {1, 2} and time.monotonic() < end:
+        while systems != {1, 2} and time.monotonic() < end:
             message = ground.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
-            heard |= {message.get_srcSystem()} if message else set()
-        assert heard == {1, 2}
+            systems |= {message.get_srcSystem()} if message else set()
+        assert systems == {1, 2}
     finally:
         second.close()
         ground.close()
@@ -109,12 +109,13 @@ def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
     assert all(beats)
 
 
-def test_a_port_that_is_taken_is_told(running):
+def test_a_port_that_is_taken_is_reported(running):
     other = Simulation(scenario(), threads=1)
-    with other, BridgeHost(other.gateway) as bridges, pytest.raises(BridgeError) as told:
+    with other, BridgeHost(other.gateway) as bridges, pytest.raises(BridgeError) as error:
         bridges.open(MavlinkUdp(port=running.base))
     assert (
-        str(told.value) == f"uav1: cannot listen on UDP port {running.base + 40}: the port is taken"
+        str(error.value)
+        == f"uav1: cannot listen on UDP port {running.base + 40}: the port is taken"
     )
     with pytest.raises(BridgeError, match="other machines"):
         running.bridges.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
@@ -148,21 +149,21 @@ def test_a_serial_line_carries_them_too(running):
     running.bridges.open(MavlinkSerial(path, 57600))
     station = mavutil.mavlink.MAVLink(None, 249, 190)
     station.robust_parsing = True
-    heard, asked = set(), False
+    kinds, asked = set(), False
     end = time.monotonic() + 60.0
-    while "COMMAND_ACK" not in heard and time.monotonic() < end:
+    while "COMMAND_ACK" not in kinds and time.monotonic() < end:
         for message in station.parse_buffer(os.read(ours, 4096)) or ():
-            heard.add(message.get_type())
-        if not asked and "HEARTBEAT" in heard:
+            kinds.add(message.get_type())
+        if not asked and "HEARTBEAT" in kinds:
             request = station.command_long_encode(1, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)
             os.write(ours, request.pack(station))
             asked = True
-    assert "COMMAND_ACK" in heard
+    assert "COMMAND_ACK" in kinds
     os.close(theirs)
     os.close(ours)
 
 
-def test_noise_on_the_socket_disturbs_nobody(running, client):
+def test_noise_on_the_socket_disturbs_no_vehicle(running, client):
     assert client.wait_heartbeat(timeout=60.0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
         for data in (b"", b"\xfd", bytes(300), b"\xfd" * 5000, random.Random(1).randbytes(1000)):

@@ -10,7 +10,7 @@ STATE = "mavros_msgs/msg/State"
 
 
 class Program:
-    """Publishes and calls below a prefix, remembers what it hears."""
+    """Publishes and calls below a prefix, remembers what it receives."""
 
     def __init__(self, simulation, prefix):
         self.simulation, self.prefix = simulation, prefix
@@ -21,11 +21,11 @@ class Program:
             ("local_position/pose", "geometry_msgs/msg/PoseStamped"),
             ("global_position/global", "sensor_msgs/msg/NavSatFix"),
         ):
-            self.graph.subscribe(f"{prefix}/{name}", self._hear, kind)
-        self.places = self.graph.advertise(f"{prefix}/setpoint_position/local", PoseStamped)
+            self.graph.subscribe(f"{prefix}/{name}", self._receive, kind)
+        self.positions = self.graph.advertise(f"{prefix}/setpoint_position/local", PoseStamped)
         self.speeds = self.graph.advertise(f"{prefix}/setpoint_velocity/cmd_vel", TwistStamped)
 
-    def _hear(self, published):
+    def _receive(self, published):
         name = published.topic.rpartition("/")[2]
         setattr(self, {"global": "fix"}.get(name, name), published.message)
 
@@ -50,20 +50,20 @@ def test_an_offboard_program_takes_off_and_flies(prefix, caplog):
         simulation.run(1.1)
         assert program.state.connected
         assert (program.state.mode, program.state.armed) == ("AUTO.LOITER", False)
-        place = zero_message("geometry_msgs/msg/PoseStamped")
-        place.pose.position.x, place.pose.position.z = 1.0, 2.0
-        place.pose.orientation.w = 1.0
+        setpoint = zero_message("geometry_msgs/msg/PoseStamped")
+        setpoint.pose.position.x, setpoint.pose.position.z = 1.0, 2.0
+        setpoint.pose.orientation.w = 1.0
         early = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode="OFFBOARD")
         assert early.mode_sent
         refused = program.call("cmd/arming", "mavros_msgs/srv/CommandBool", value=True)
         assert (refused.success, refused.result) == (False, 1)
         assert f"{prefix}: arming True: no offboard signal" in caplog.messages
-        program.stream(program.places, place, 1.0)
+        program.stream(program.positions, setpoint, 1.0)
         for name in ("OFFBOARD",):
             sent = program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode=name)
             assert sent.mode_sent
         assert program.call("cmd/arming", "mavros_msgs/srv/CommandBool", value=True).success
-        program.stream(program.places, place, 6.0)
+        program.stream(program.positions, setpoint, 6.0)
         assert (program.state.mode, program.state.armed) == ("OFFBOARD", True)
         here = program.pose.pose.position
         assert (here.x, here.y, here.z) == pytest.approx((1.0, 0.0, 2.0), abs=0.3)

@@ -85,8 +85,8 @@ def test_a_second_joystick_waits_until_the_first_is_silent(air):
         steer(station, 0.05, z=500)
         other.send("manual_control", 1, 1000, 0, 500, 0, 0)
     assert uav.position_map == pytest.approx(start, abs=0.3)
-    told = [text for text in station.texts if "Manual control of system 254 ignored" in text]
-    assert len(told) == 1
+    texts = [text for text in station.texts if "Manual control of system 254 ignored" in text]
+    assert len(texts) == 1
     station.seconds(0.6)  # COM_RC_LOSS_T is 0.5 s
     steer(other, 0.2)
     assert station.mode(3) == ACCEPTED
@@ -129,7 +129,7 @@ def test_texts_arrive_whole(length):
 def test_texts_that_follow_each_other_have_ids_of_their_own(ground):
     station, _ = ground
     for text in ("ab" * 40, "ba" * 40, "ba" * 40):
-        autopilot_of(station).context.say(6, text)
+        autopilot_of(station).context.report(6, text)
     station.seconds(0.05)
     longs = station.of("STATUSTEXT")
     assert len({m.id for m in longs if m.id}) == 3
@@ -144,28 +144,28 @@ def autopilot_of(station):
 
 
 def enter(station):
-    station.stream(0.3, station.place, 0.0, 0.0, -4.0)
+    station.stream(0.3, station.send_position, 0.0, 0.0, -4.0)
     assert station.mode(6) == ACCEPTED
 
 
-def aim(station, frame=1, mask=0, place=(0, 0, 0), velocity=(0, 0, 0), push=(0, 0, 0), **turn):
+def aim(station, frame=1, mask=0, position=(0, 0, 0), velocity=(0, 0, 0), push=(0, 0, 0), **turn):
     yaw, rate = turn.get("yaw", 0.0), turn.get("rate", 0.0)
-    fields = (0, 1, 1, frame, mask, *place, *velocity, *push, yaw, rate)
+    fields = (0, 1, 1, frame, mask, *position, *velocity, *push, yaw, rate)
     station.send("set_position_target_local_ned", *fields)
 
 
 @pytest.mark.parametrize(
-    ("mask", "place", "velocity"),
+    ("mask", "position", "velocity"),
     [
         (0b0000111111000111, (0, 0, 0), (1, 0, 0)),  # the masks of DroneKit's examples: bit 9 set,
         (0b0000111111111000, (8, 0, -4), (0, 0, 0)),  # without an acceleration to be a force
     ],
 )
-def test_the_force_bit_without_an_acceleration_says_nothing(air, mask, place, velocity):
+def test_the_force_bit_without_an_acceleration_says_nothing(air, mask, position, velocity):
     """PX4 refuses forces only where an acceleration is finite."""
     station, uav = air
     enter(station)
-    station.stream(1.5, aim, station, 1, mask, place, velocity)
+    station.stream(1.5, aim, station, 1, mask, position, velocity)
     assert uav.velocity_map[1] > 0.7
     assert station.present_mode == (6, 0)
 
@@ -184,9 +184,9 @@ def test_the_force_bit_without_an_acceleration_says_nothing(air, mask, place, ve
 def test_refused_setpoints_name_their_reason_once_a_second(air, frame, mask, why):
     station, _ = air
     station.stream(1.5, aim, station, frame, mask, (1, 1, -4), (1, 1, 0), (1, 1, 0))
-    told = [text for text in station.texts if why in text]
-    assert len(told) == 2
-    assert told[0].startswith("SET_POSITION_TARGET_LOCAL_NED")
+    texts = [text for text in station.texts if why in text]
+    assert len(texts) == 2
+    assert texts[0].startswith("SET_POSITION_TARGET_LOCAL_NED")
     assert station.mode(6) == REJECTED
 
 
@@ -236,9 +236,9 @@ def test_a_position_on_earth_counts_with_all_its_components_only(air):
 def test_refused_attitudes_name_their_reason(ground, mask, rates, thrust, why):
     station, _ = ground
     station.send("set_attitude_target", 0, 1, 1, mask, (1, 0, 0, 0), *rates, thrust)
-    told = [text for text in station.texts if why in text]
-    assert told
-    assert told[0].startswith("SET_ATTITUDE_TARGET")
+    texts = [text for text in station.texts if why in text]
+    assert texts
+    assert texts[0].startswith("SET_ATTITUDE_TARGET")
 
 
 def test_rates_without_a_yaw_rate_keep_the_present_one(air):
@@ -380,8 +380,8 @@ def test_messages_that_a_px4_obeys_and_this_one_does_not_are_named_once(ground):
     station, _ = ground
     for _ in range(5):
         station.send("rc_channels_override", 1, 1, *(1500,) * 8)
-    told = [text for text in station.texts if "RC_CHANNELS_OVERRIDE" in text]
-    assert told == ["RC_CHANNELS_OVERRIDE is not supported and ignored"]
+    texts = [text for text in station.texts if "RC_CHANNELS_OVERRIDE" in text]
+    assert texts == ["RC_CHANNELS_OVERRIDE is not supported and ignored"]
 
 
 def test_commands_plans_and_parameters_name_their_vehicle(ground):
@@ -417,8 +417,8 @@ def send_plan(station, items, current=-1, stays=()):
     station.send("mission_count", 1, 1, len(items), 0)
     for sequence, (command, frame, params, x, y, z) in enumerate(items):
         fields = (frame, command, int(sequence == current), int(sequence not in stays), *params)
-        place = [part if isinstance(part, int) else round(part * 1e7) for part in (x, y)]
-        station.send("mission_item_int", 1, 1, sequence, *fields, *place, z, 0)
+        position = [part if isinstance(part, int) else round(part * 1e7) for part in (x, y)]
+        station.send("mission_item_int", 1, 1, sequence, *fields, *position, z, 0)
         if len(station.of("MISSION_ACK")) > before:
             break
     return station.last("MISSION_ACK").type
@@ -465,7 +465,7 @@ def test_jumps_are_counted_on_unless_the_mission_is_reset(ground):
     assert station.last("MISSION_CURRENT").seq == 1
 
 
-def test_a_take_off_and_a_landing_of_a_mission_have_place_and_heading(ground):
+def test_a_take_off_and_a_landing_of_a_mission_have_position_and_heading(ground):
     """MAV_CMD_NAV_TAKEOFF: position; MAV_CMD_NAV_LAND: "desired yaw angle"."""
     station, uav = ground
     land = at(6.0, 5.0, 0.0, LAND, (0.0, 0.0, 0.0, 180.0))
@@ -511,7 +511,7 @@ def test_turns_keep_rate_and_direction(air):
         assert send_plan(station, [do(YAW, *map(float, turn))]) in (6, 7, 8, 9)
 
 
-def test_places_of_missions_may_be_missing_and_have_frames_of_px4(ground):
+def test_positions_of_missions_may_be_missing_and_have_frames_of_px4(ground):
     """INT32_MAX is no latitude; PX4 knows no terrain frames: MAV_MISSION_UNSUPPORTED_FRAME."""
     station, _ = ground
     unset = 2**31 - 1
@@ -521,7 +521,7 @@ def test_places_of_missions_may_be_missing_and_have_frames_of_px4(ground):
         assert send_plan(station, [at(0.0, 0.0, 3.0, TAKE_OFF, frame=frame)]) == 2
 
 
-def test_a_second_link_hears_what_is_sent_to_everyone(ground):
+def test_a_second_link_receives_what_is_sent_to_everyone(ground):
     """MAV_CMD_REQUEST_MESSAGE: param7, 2: broadcast."""
     station, _ = ground
     other = Station(station.simulation, system=254, link=8)

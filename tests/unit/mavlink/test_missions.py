@@ -14,7 +14,7 @@ RADIUS_M = 6.37e6
 
 
 def at(north, east, up, command=WAYPOINT, params=(0.0, 0.0, 0.0, NAN)):
-    """An item at a place from the first UAV's start, above home."""
+    """An item at a position from the first UAV's start, above home."""
     latitude = LATITUDE + math.degrees(north / RADIUS_M)
     longitude = LONGITUDE + math.degrees(east / RADIUS_M / math.cos(math.radians(LATITUDE)))
     return command, 6, params, latitude, longitude, up
@@ -140,20 +140,20 @@ def test_a_region_of_interest_is_faced_until_there_is_none(flight):
             2 * (w * z + x * y), 1 - 2 * (y * y + z * z)
         )
     assert yaws[5] == pytest.approx(math.atan2(20.0, -20.0), abs=0.15)  # 20 m north-west of there
-    assert yaws[14] == pytest.approx(0.0, abs=0.1)  # the way leads east
+    assert yaws[14] == pytest.approx(0.0, abs=0.1)  # the path leads east
 
 
 @pytest.mark.parametrize(
-    ("last", "mode", "told"),
+    ("last", "mode", "texts"),
     [([], (4, 4), ["Mission finished, loitering"]), ([do(RETURN)], (4, 5), [])],
 )
-def test_its_end_in_the_air_is_told_where_it_stays_there(flight, last, mode, told):
+def test_its_end_in_the_air_is_reported_where_it_stays_there(flight, last, mode, texts):
     _, station = flight
     assert station.upload([at(0, 0, 3, TAKE_OFF), at(4, 0, 3), *last]) == ACCEPTED
     assert station.command(300, 0.0, 0.0) == ACCEPTED
     station.seconds(9.0)
     assert station.last("MISSION_ITEM_REACHED").seq == 1 + len(last)
-    assert [text for text in station.texts if text.startswith("Mission finished")] == told
+    assert [text for text in station.texts if text.startswith("Mission finished")] == texts
     assert station.present_mode == mode
 
 
@@ -180,8 +180,8 @@ def test_plans_come_back_as_they_went(flight):
                 frame,
                 kind,
             )
-            told = (item.param1, item.param2, item.param3, item.param4)
-            assert told == pytest.approx(params, nan_ok=True)
+            returned = (item.param1, item.param2, item.param3, item.param4)
+            assert returned == pytest.approx(params, nan_ok=True)
             assert (item.x, item.y) == (round(x * 1e7), round(y * 1e7))
             assert item.z == pytest.approx(z, nan_ok=True)
         station.send("mission_ack", 1, 1, 0, kind)
@@ -205,7 +205,7 @@ def test_plans_come_back_as_they_went(flight):
         ([(WAYPOINT, 1, (0, 0, 0, 0), LATITUDE, LONGITUDE, 3.0)], 0, 2),  # a local frame
         ([do(183, 1.0, 1500.0)], 0, 3),  # servos: not of PX4's missions
         ([at(0, 0, 3, 18, (2.0, 0.0, 5.0, 0.0))], 0, 3),  # nor turns
-        ([at(0, 0, 3, 189)], 0, 3),  # a marker has no place
+        ([at(0, 0, 3, 189)], 0, 3),  # a marker has no position
         ([do(195)], 0, 3),  # a region of interest has one
         ([do(201, 3.0)], 0, 6),
         ([do(2001, 0.0, 7.0)], 0, 7),  # takes one parameter
@@ -224,7 +224,7 @@ def test_contradictory_plans_are_refused_with_the_reason(flight, items, kind, re
     assert station.last("MISSION_COUNT").count == 1  # what was there is there still
 
 
-def test_too_many_items_and_strangers(flight):
+def test_too_many_items_and_foreign_senders(flight):
     simulation, station = flight
     station.send("mission_count", 1, 1, 501, 0)
     assert station.last("MISSION_ACK").type == 4
@@ -232,7 +232,7 @@ def test_too_many_items_and_strangers(flight):
     other = Station(simulation, system=200, link=9)
     other.send("mission_count", 1, 1, 1, 0)
     assert other.last("MISSION_ACK").type == 14
-    other.item(0, at(0, 0, 3))  # nobody asked it
+    other.item(0, at(0, 0, 3))  # not requested
     assert station.last("MISSION_REQUEST_INT").seq == 0
 
 
@@ -243,9 +243,9 @@ def test_items_may_come_early_and_twice(flight):
     for sequence in (1, 2, 0, 2, 0):
         station.item(sequence, items[sequence])
     assert not station.of("MISSION_ACK")
-    station.heard.clear()
+    station.received.clear()
     station.seconds(0.4)
-    assert station.last("MISSION_REQUEST_INT").seq == 1  # what is awaited is asked for again
+    assert station.last("MISSION_REQUEST_INT").seq == 1  # the awaited item is requested again
     for sequence in (1, 1, 2):
         station.item(sequence, items[sequence])
     assert [ack.type for ack in station.of("MISSION_ACK")] == [ACCEPTED]
@@ -269,7 +269,7 @@ def test_an_upload_that_its_sender_cancels_ends_at_once(flight):
     station.send("mission_ack", 1, 1, 1, 0)  # not a cancellation
     assert other.upload([at(0, 0, 3)]) == 14
     station.send("mission_ack", 1, 1, 15, 0)
-    station.heard.clear()
+    station.received.clear()
     station.seconds(1.0)
     assert not station.of("MISSION_REQUEST_INT")
     station.send("mission_request_int", 1, 1, 0, 0)
@@ -297,9 +297,9 @@ def test_pausing_setting_the_item_and_going_on(flight):
     station.seconds(6.0)
     assert station.command(193, 0.0) == ACCEPTED
     station.seconds(2.5)
-    place = simulation.uavs["uav1"].position_map
+    position = simulation.uavs["uav1"].position_map
     station.seconds(1.0)
-    assert simulation.uavs["uav1"].position_map == pytest.approx(place, abs=0.2)
+    assert simulation.uavs["uav1"].position_map == pytest.approx(position, abs=0.2)
     assert station.command(224, 7.0) == 4  # no such item: FAILED
     assert station.command(224, 2.0) == ACCEPTED
     assert station.mode(4, 4) == ACCEPTED
@@ -349,14 +349,14 @@ def test_a_mission_that_leaves_the_fence_is_not_begun(flight):
         ([at(0, 0, -1, TAKE_OFF)], "Mission rejected: Takeoff altitude below home altitude!"),
     ],
 )
-def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, text):
+def test_missions_that_cannot_be_flown_are_reported_and_not_started(flight, items, text):
     _, station = flight
     assert station.upload(items) == ACCEPTED  # as PX4, which keeps them
     assert text in station.texts
-    station.heard.clear()
+    station.received.clear()
     assert station.command(300, 0.0, 0.0) == DENIED
-    assert any(text in said for said in station.texts)
-    station.heard.clear()
+    assert any(text in each for each in station.texts)
+    station.received.clear()
     assert station.mode(4, 4) == ACCEPTED
     assert station.command(400, 1.0) == 1
     assert f"Arming denied: {text}" in station.texts
@@ -364,7 +364,7 @@ def test_missions_that_cannot_be_flown_are_told_of_and_not_begun(flight, items, 
     assert not station.armed
 
 
-def test_a_far_first_waypoint_is_told_of_and_may_be_flown(flight):
+def test_a_far_first_waypoint_is_reported_and_may_be_flown(flight):
     _, station = flight
     assert station.upload([at(0, 0, 3, TAKE_OFF), at(50, 0, 3)]) == ACCEPTED
     assert not [text for text in station.texts if "far away" in text]

@@ -19,7 +19,7 @@ def flight():
 
 
 def enter(station):
-    station.stream(0.5, station.place, 0.0, 0.0, -4.0)
+    station.stream(0.5, station.send_position, 0.0, 0.0, -4.0)
     assert station.mode(6) == ACCEPTED
     assert station.present_mode == (6, 0)
 
@@ -27,7 +27,7 @@ def enter(station):
 def test_setpoints_must_come_before_and_must_be_fresh(flight):
     _, station, _ = flight
     assert station.mode(6) == REJECTED
-    station.place(0.0, 0.0, -4.0)
+    station.send_position(0.0, 0.0, -4.0)
     station.seconds(0.6)
     assert station.mode(6) == REJECTED
     enter(station)
@@ -37,7 +37,7 @@ def test_flies_a_square_and_ends_where_it_began(flight):
     _, station, uav = flight
     enter(station)
     for north, east in ((5.0, 0.0), (5.0, 5.0), (0.0, 5.0), (0.0, 0.0)):
-        station.stream(5.0, station.place, north, east, -4.0)
+        station.stream(5.0, station.send_position, north, east, -4.0)
         assert uav.position_map[:2] == pytest.approx([east, north], abs=0.5)
     assert uav.position_map == pytest.approx([0.0, 0.0, 4.1], abs=0.3)
 
@@ -54,7 +54,7 @@ def test_velocities_in_map_and_body(flight):
 
 
 def test_height_and_velocity_may_be_mixed(flight):
-    """As PX4 allows: north by velocity, height by place."""
+    """As PX4 allows: north by velocity, height by position."""
     _, station, uav = flight
     enter(station)
     fields = (0, 1, 1, 1, 0b110111000011, 0, 0, -6.0, 0, 0, 0, 0, 0, 0, 0.0, 0)
@@ -66,7 +66,7 @@ def test_height_and_velocity_may_be_mixed(flight):
     assert uav.position_map[2] == pytest.approx(6.1, abs=0.3)
 
 
-def test_a_place_with_a_velocity_is_tracked(flight):
+def test_a_position_with_a_velocity_is_tracked(flight):
     _, station, uav = flight
     enter(station)
     errors = []
@@ -115,15 +115,15 @@ def test_starts_from_the_ground_for_setpoints_upwards():
     simulation, station = fly()
     with simulation:
         station.seconds(0.1)
-        station.stream(0.3, station.place, 0.0, 0.0, -3.0)
+        station.stream(0.3, station.send_position, 0.0, 0.0, -3.0)
         assert station.mode(6) == ACCEPTED
         assert station.command(400, 1.0) == ACCEPTED
-        station.stream(7.0, station.place, 0.0, 0.0, -3.0)
+        station.stream(7.0, station.send_position, 0.0, 0.0, -3.0)
         assert station.present_mode == (6, 0)
         assert simulation.uavs["uav1"].position_map == pytest.approx([0, 0, 3.1], abs=0.3)
 
 
-@pytest.mark.parametrize("kind", ["place", "velocity", "attitude"])
+@pytest.mark.parametrize("kind", ["position", "velocity", "attitude"])
 def test_takes_over_at_once_from_a_take_off(kind):
     """As PX4: the take-off ends where offboard begins, and the setpoint is flown."""
     simulation, station = fly()
@@ -133,7 +133,7 @@ def test_takes_over_at_once_from_a_take_off(kind):
         assert station.command(400, 1.0) == station.command(22) == ACCEPTED
         station.seconds(1.2)
         setpoint = {
-            "place": lambda: station.place(1.0, 0.0, -3.0),
+            "position": lambda: station.send_position(1.0, 0.0, -3.0),
             "velocity": lambda: station.velocity(1.0, 0.0, 0.0),
             "attitude": lambda: station.send(
                 "set_attitude_target", 0, 1, 1, 7, (1, 0, 0, 0), 0.0, 0.0, 0.0, 0.536
@@ -143,12 +143,12 @@ def test_takes_over_at_once_from_a_take_off(kind):
         assert simulation.uavs["uav1"].mode.name == "TAKE_OFF"
         assert station.mode(6) == ACCEPTED
         station.stream(0.1, setpoint)
-        wanted = {"place": "GO_TO", "velocity": "VELOCITY", "attitude": "LOW_LEVEL"}[kind]
+        wanted = {"position": "GO_TO", "velocity": "VELOCITY", "attitude": "LOW_LEVEL"}[kind]
         assert simulation.uavs["uav1"].mode.name == wanted
         station.stream(2.9, setpoint, every=0.1)
         assert station.present_mode == (6, 0)
         assert simulation.uavs["uav1"].position_map[2] < 6.0
-        if kind == "place":
+        if kind == "position":
             station.stream(3.0, setpoint, every=0.1)
             there = simulation.uavs["uav1"].position_map
             assert there == pytest.approx([0.0, 1.0, 3.1], abs=0.3)
@@ -159,11 +159,11 @@ def test_takes_over_before_a_take_off_has_left_the_ground():
     simulation, station = fly()
     with simulation:
         station.seconds(0.1)
-        station.stream(0.2, station.place, 0.0, 0.0, -3.0)
+        station.stream(0.2, station.send_position, 0.0, 0.0, -3.0)
         assert station.command(400, 1.0) == station.command(22) == ACCEPTED
-        station.stream(0.1, station.place, 0.0, 0.0, -3.0)
+        station.stream(0.1, station.send_position, 0.0, 0.0, -3.0)
         assert station.mode(6) == ACCEPTED
-        station.stream(6.0, station.place, 0.0, 0.0, -3.0, every=0.1)
+        station.stream(6.0, station.send_position, 0.0, 0.0, -3.0, every=0.1)
         assert station.present_mode == (6, 0)
         assert simulation.uavs["uav1"].position_map == pytest.approx([0, 0, 3.1], abs=0.3)
 
@@ -182,19 +182,19 @@ def test_its_loss_leads_to_the_mode_that_is_set(flight, action, mode):
     assert "Failsafe: offboard control lost" in station.texts
 
 
-def test_a_second_station_is_not_heard_while_the_first_one_flies(flight):
+def test_a_second_station_is_ignored_while_the_first_one_flies(flight):
     simulation, station, uav = flight
     other = Station(simulation, system=254, link=8)
     enter(station)
     for _ in range(40):
-        station.place(0.0, 0.0, -4.0)
-        other.place(20.0, 20.0, -20.0)
+        station.send_position(0.0, 0.0, -4.0)
+        other.send_position(20.0, 20.0, -20.0)
         station.seconds(0.05)
     assert math.dist(uav.position_map, (0.0, 0.0, 4.1)) < 0.5
     warnings = [text for text in station.texts if "254/190 ignored" in text]
     assert len(warnings) == 1
     station.seconds(1.1)
-    other.place(0.0, 0.0, -5.0)
+    other.send_position(0.0, 0.0, -5.0)
     assert other.mode(6) == ACCEPTED  # the first one has fallen silent
 
 
@@ -213,7 +213,7 @@ def test_a_second_station_is_not_heard_while_the_first_one_flies(flight):
 def test_setpoints_that_say_nothing_do_not_count(flight, fields):
     _, station, uav = flight
     frame, mask, x, y, z = fields
-    station.place(x, y, z, mask=mask, frame=frame)
+    station.send_position(x, y, z, mask=mask, frame=frame)
     assert station.mode(6) == REJECTED
     station.send("set_attitude_target", 0, 1, 1, 7, (0, 0, 0, 0), 0.0, 0.0, 0.0, 0.5)
     station.send("set_attitude_target", 0, 1, 1, 7, (1, 0, 0, 0), 0.0, 0.0, 0.0, math.nan)
@@ -222,7 +222,7 @@ def test_setpoints_that_say_nothing_do_not_count(flight, fields):
 
 
 def test_reaches_the_motors_within_ten_milliseconds():
-    """At 250 Hz of physics, in simulated time: attitudes, velocities and places alike."""
+    """At 250 Hz of physics, in simulated time: attitudes, velocities and positions alike."""
     simulation, station = fly(physics={"rate_hz": 250})
     with simulation:
         station.seconds(0.1)

@@ -53,8 +53,8 @@ def test_odometry_is_in_ros_frames():
     attitude = mavlink.MAVLink_attitude_quaternion_message(0, 1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3)
     position = mavlink.MAVLink_local_position_ned_message(0, 1.0, 2.0, -3.0, 4.0, 5.0, -6.0)
     message = odometry(position, attitude, 7, "uav1/")
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    assert (place.x, place.y, place.z) == (2.0, 1.0, 3.0)
+    point, turn = message.pose.pose.position, message.pose.pose.orientation
+    assert (point.x, point.y, point.z) == (2.0, 1.0, 3.0)
     assert (turn.z, turn.w) == pytest.approx((s, s))
     assert abs(np.dot([turn.x, turn.y, turn.z, turn.w], q)) == pytest.approx(1.0)
     v, w = message.twist.twist.linear, message.twist.twist.angular

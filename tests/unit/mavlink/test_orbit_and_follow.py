@@ -30,7 +30,7 @@ def orbit(station, radius=10.0, speed=3.0, facing=0.0, north=0.0, height=6.0):
 
 
 @pytest.mark.parametrize("radius", [10.0, -10.0])
-def test_orbits_round_a_place_facing_it(flight, radius):
+def test_orbits_round_a_position_facing_it(flight, radius):
     uav, station = flight
     assert orbit(station, radius, north=10.0) == ACCEPTED
     assert station.present_mode == (3, 1)
@@ -51,8 +51,8 @@ def test_orbits_round_a_place_facing_it(flight, radius):
     clockwise = math.copysign(1.0, radius)
     assert turned * -clockwise == pytest.approx(3.0 / 10.0 * 19.5, rel=0.08)
     assert station.command(512, 360.0) == ACCEPTED
-    told = station.last("ORBIT_EXECUTION_STATUS")
-    assert (told.radius, told.z) == (radius, pytest.approx(ALTITUDE + 6.0))
+    status = station.last("ORBIT_EXECUTION_STATUS")
+    assert (status.radius, status.z) == (radius, pytest.approx(ALTITUDE + 6.0))
 
 
 def test_an_orbit_is_held_within_its_limits(flight):
@@ -76,10 +76,10 @@ def test_orbits_that_cannot_be_are_refused():
 
 
 def target(station, north, east, velocity=(NAN, NAN, NAN), altitude=ALTITUDE):
-    place = (round((LATITUDE + north * M) * 1e7), round((LONGITUDE + east * 1.4772 * M) * 1e7))
+    position = (round((LATITUDE + north * M) * 1e7), round((LONGITUDE + east * 1.4772 * M) * 1e7))
     unknown = [NAN] * 3
     rest = (velocity, unknown, [1.0, NAN, NAN, NAN], unknown, unknown, 0)
-    station.send("follow_target", 0, 1, *place, altitude, *rest)
+    station.send("follow_target", 0, 1, *position, altitude, *rest)
 
 
 def test_follows_a_target_that_moves(flight):

@@ -1,4 +1,4 @@
-"""Parameters as PX4 carries them, streams and their rates, what is told on request."""
+"""Parameters as PX4 carries them, streams and their rates, what is sent on request."""
 
 import importlib.metadata
 import math
@@ -28,12 +28,12 @@ def station():
 def test_the_whole_list_comes_and_single_ones(station):
     station.send("param_request_list", 1, 1)
     station.seconds(1.0)
-    told = {m.param_id: m for m in station.of("PARAM_VALUE")}
-    assert station.of("PARAM_VALUE")[0] is told.pop("_HASH_CHECK")
-    assert set(told) == set(NAMES)
-    assert {m.param_count for m in told.values()} == {len(NAMES)}
-    assert sorted(m.param_index for m in told.values()) == list(range(len(NAMES)))
-    station.heard.clear()
+    values = {m.param_id: m for m in station.of("PARAM_VALUE")}
+    assert station.of("PARAM_VALUE")[0] is values.pop("_HASH_CHECK")
+    assert set(values) == set(NAMES)
+    assert {m.param_count for m in values.values()} == {len(NAMES)}
+    assert sorted(m.param_index for m in values.values()) == list(range(len(NAMES)))
+    station.received.clear()
     station.send("param_request_read", 1, 1, b"COM_DL_LOSS_T", -1)
     whole = station.last("PARAM_VALUE")
     assert whole.param_type == 6
@@ -59,16 +59,16 @@ def crc32(data):
 
 
 def test_the_check_of_all_parameters_is_px4s_and_ends_a_list(station):
-    station.heard.clear()
+    station.received.clear()
     station.send("param_request_read", 1, 1, b"_HASH_CHECK", -1)
     station.send("param_request_list", 1, 1)
     station.seconds(0.5)
-    first, *told = station.of("PARAM_VALUE")
+    first, *others = station.of("PARAM_VALUE")
     assert (first.param_type, first.param_index, first.param_count) == (5, 65535, len(NAMES))
-    values = {m.param_id: bytes(m.get_msgbuf()[10:14]) for m in told if m.param_type != 5}
+    values = {m.param_id: bytes(m.get_msgbuf()[10:14]) for m in others if m.param_type != 5}
     whole = b"".join(name.encode() + values[name] for name in NAMES)
     assert int.from_bytes(first.get_msgbuf()[10:14], "little") == crc32(whole)
-    station.heard.clear()
+    station.received.clear()
     station.send("param_request_list", 1, 1)
     station.send("param_set", 1, 1, b"_HASH_CHECK", first.param_value, 5)
     station.seconds(0.5)
@@ -77,17 +77,17 @@ def test_the_check_of_all_parameters_is_px4s_and_ends_a_list(station):
 
 
 def files(station, opcode, size=0, sequence=9, path=b""):
-    """Opcode, size, opcode answered and first byte of the answer to a request of MAVLink FTP."""
+    """Opcode, size, opcode answered and first byte of the response to a request of MAVLink FTP."""
     head = struct.pack("<HBBBBBBI", sequence, 3, opcode, size, 0, 0, 0, 77)
     station.send("file_transfer_protocol", 0, 1, 1, (head + path).ljust(251, b"\0"))
-    answer = station.last("FILE_TRANSFER_PROTOCOL")
-    told, session, *rest, _, _, offset = struct.unpack_from("<HBBBBBBI", bytes(answer.payload))
-    assert (told, session, offset) == (sequence + 1 & 0xFFFF, 3, 77)
-    assert (answer.target_system, answer.target_component) == (255, 190)
-    return (*rest, answer.payload[12])
+    response = station.last("FILE_TRANSFER_PROTOCOL")
+    number, session, *rest, _, _, offset = struct.unpack_from("<HBBBBBBI", bytes(response.payload))
+    assert (number, session, offset) == (sequence + 1 & 0xFFFF, 3, 77)
+    assert (response.target_system, response.target_component) == (255, 190)
+    return (*rest, response.payload[12])
 
 
-def test_file_requests_hear_that_there_are_none(station):
+def test_file_requests_are_answered_that_there_are_none(station):
     path = b"/etc/extras/component_general.json.xz"
     assert files(station, 4, len(path), path=path) == (129, 1, 4, 10)
     assert files(station, 3, 1, 65535, b"/") == (129, 1, 3, 10)
@@ -99,7 +99,7 @@ def test_file_requests_hear_that_there_are_none(station):
 
 
 def test_setting_checks_type_and_range(station):
-    station.heard.clear()
+    station.received.clear()
     assert station.set("MIS_TAKEOFF_ALT", 7.5) == 7.5
     assert station.set("MIS_TAKEOFF_ALT", 500.0) == 7.5
     assert station.set("MIS_TAKEOFF_ALT", NAN) == 7.5
@@ -126,13 +126,13 @@ def test_streams_come_at_their_rates(profile):
     with simulation:
         station = Station(simulation, link=11, profile=profile)
         station.seconds(1.0)
-        station.heard.clear()
+        station.received.clear()
         station.seconds(10.0)
-        counts = Counter(message.get_msgId() for message in station.heard)
+        counts = Counter(message.get_msgId() for message in station.received)
         silent = {29, 83, 85, 360}  # no barometer; no targets, no orbit; the battery is ideal
         if 147 not in counts:
             silent |= {147}
-        assert 436 in RATES_HZ[profile]  # not of pymavlink's, so it is not heard
+        assert 436 in RATES_HZ[profile]  # not of pymavlink's, so it is not decoded
         for number, rate in RATES_HZ[profile].items():
             if number == 436:
                 continue
@@ -148,27 +148,27 @@ def test_rates_are_those_of_px4():
     assert not {2, 105, 111, 331} & set(normal)  # SYSTEM_TIME and the like are onboard's
 
 
-def test_intervals_are_set_told_and_taken_back(station):
+def test_intervals_are_set_reported_and_reset(station):
     assert station.command(511, 30.0, 50_000.0) == ACCEPTED
-    station.heard.clear()
+    station.received.clear()
     station.seconds(1.0)
     assert len(station.of("ATTITUDE")) == pytest.approx(20, abs=1)
     assert station.command(512, 244.0, 30.0) == ACCEPTED
     assert station.last("MESSAGE_INTERVAL").interval_us == 50_000
     assert station.command(511, 30.0, -1.0) == ACCEPTED
-    station.heard.clear()
+    station.received.clear()
     station.seconds(0.5)
     assert not station.of("ATTITUDE")
     assert station.command(510, 30.0) == ACCEPTED
     assert station.last("MESSAGE_INTERVAL").interval_us == -1
     for unknown in (510, 511, 512):
-        station.heard.clear()
+        station.received.clear()
         assert (
             station.command(unknown, 9999.0, 1000.0)
             == ({510: ACCEPTED, 511: FAILED, 512: DENIED}[unknown])
         )
-        told = [(m.message_id, m.interval_us) for m in station.of("MESSAGE_INTERVAL")]
-        assert told == ([(9999, -1)] if unknown == 510 else [])
+        intervals = [(m.message_id, m.interval_us) for m in station.of("MESSAGE_INTERVAL")]
+        assert intervals == ([(9999, -1)] if unknown == 510 else [])
     assert station.command(511, 0.0, 1000.0) == FAILED  # the heartbeat stays as it is
     assert station.command(511, 30.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 2.0) == FAILED
     assert station.command(510, -3.0) == DENIED
@@ -176,7 +176,7 @@ def test_intervals_are_set_told_and_taken_back(station):
     assert station.command(511, 30.0, 0.0) == ACCEPTED  # this link begins without it
 
 
-def test_what_is_told_on_request(station):
+def test_what_is_sent_on_request(station):
     assert station.command(512, 148.0) == ACCEPTED
     version = station.last("AUTOPILOT_VERSION")
     assert version.capabilities & 4
@@ -211,10 +211,10 @@ def payloads(taken, number, layout):
     return found
 
 
-def test_modes_and_versions_are_told_in_messages_that_pymavlink_lacks(station):
+def test_modes_and_versions_are_sent_in_messages_that_pymavlink_lacks(station):
     taken = []
     graph = station.simulation.graph
-    graph.subscribe("/uav1/mavlink/out", lambda heard: taken.append(heard.message), PACKETS)
+    graph.subscribe("/uav1/mavlink/out", lambda published: taken.append(published.message), PACKETS)
     assert station.command(512, 300.0) == ACCEPTED
     assert station.command(519, 1.0) == ACCEPTED
     assert station.command(512, 436.0) == ACCEPTED
@@ -230,43 +230,43 @@ def test_modes_and_versions_are_told_in_messages_that_pymavlink_lacks(station):
     assert {mode[4]: mode[0] >> 16 for mode in modes}[7] == 0x0604  # landing
 
 
-def test_a_barometer_is_told_where_there_is_one(station):
+def test_pressure_is_sent_where_there_is_a_barometer(station):
     assert station.command(512, 29.0) == DENIED
     simulation, other = fly(sensors=[{"kind": "barometer"}])
     with simulation:
         other.seconds(1.0)
         assert other.command(512, 29.0) == ACCEPTED
-        told = other.last("SCALED_PRESSURE")
-        assert told.press_abs == pytest.approx(956.0, abs=3.0)  # 488 m above the sea
-        assert told.temperature != 0
+        message = other.last("SCALED_PRESSURE")
+        assert message.press_abs == pytest.approx(956.0, abs=3.0)  # 488 m above the sea
+        assert message.temperature != 0
 
 
 def test_the_old_message_for_modes_is_answered(station):
-    station.heard.clear()
+    station.received.clear()
     station.send("set_mode", 1, 1, 4 << 16 | 3 << 24)
-    answers = [(ack.command, ack.result) for ack in station.of("COMMAND_ACK")]
-    assert answers == [(176, ACCEPTED)]
+    responses = [(ack.command, ack.result) for ack in station.of("COMMAND_ACK")]
+    assert responses == [(176, ACCEPTED)]
 
 
-def test_odometry_is_told_with_covariances_that_are_not_known(station):
+def test_odometry_is_sent_with_covariances_that_are_not_known(station):
     assert station.command(512, 331.0) == ACCEPTED
-    told = station.last("ODOMETRY")
-    assert (told.frame_id, told.child_frame_id) == (1, 1)
-    assert told.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)], abs=1e-4)
-    assert math.isnan(told.pose_covariance[0])
-    assert math.isnan(told.velocity_covariance[0])
+    odometry = station.last("ODOMETRY")
+    assert (odometry.frame_id, odometry.child_frame_id) == (1, 1)
+    assert odometry.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)], abs=1e-4)
+    assert math.isnan(odometry.pose_covariance[0])
+    assert math.isnan(odometry.velocity_covariance[0])
 
 
-def test_health_is_all_well_and_place_agrees_with_the_map(station):
+def test_health_is_all_well_and_position_agrees_with_the_map(station):
     assert station.command(512, 1.0) == ACCEPTED
     status = station.last("SYS_STATUS")
     present = status.onboard_control_sensors_present
     assert present & status.onboard_control_sensors_health == present
     for number in (33, 32, 30, 31, 24, 245, 105):
         assert station.command(512, float(number)) == ACCEPTED
-    place = station.last("GLOBAL_POSITION_INT")
-    assert place.lat == pytest.approx(473977420, abs=2)
-    assert place.hdg == pytest.approx(9000, abs=10)  # looks east
+    position = station.last("GLOBAL_POSITION_INT")
+    assert position.lat == pytest.approx(473977420, abs=2)
+    assert position.hdg == pytest.approx(9000, abs=10)  # looks east
     assert station.last("ATTITUDE").yaw == pytest.approx(math.pi / 2, abs=1e-3)
     q = station.last("ATTITUDE_QUATERNION")
     assert (q.q1, q.q4) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)), abs=1e-3)

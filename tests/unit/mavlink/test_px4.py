@@ -25,7 +25,7 @@ from volery.scenario.load import parse_scenario
 
 PATIENT = TimeoutPolicy(60.0)
 CLIMB = 0.78
-"""Share of full speed; 0.73 carries an iris: the root of its share of thrust."""
+"""Fraction of full speed; 0.73 carries an iris: the root of its fraction of thrust."""
 
 
 def scenario(count=1):
@@ -105,25 +105,25 @@ def is_ended(connection):
     return True
 
 
-def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(opened, caplog):
+def test_a_client_without_mavlink_is_replaced_and_one_after_a_px4_is_closed(opened, caplog):
     simulation, bridge = opened()
     address = ("127.0.0.1", bridge.ports[0])
-    with socket.create_connection(address) as stranger:
+    with socket.create_connection(address) as client:
         meet(simulation, bridge, 1)
-        stranger.sendall(b"hello, is this the way to the aviary?" * 5)
+        client.sendall(b"hello, is this the way to the aviary?" * 5)
         end = time.monotonic() + 60.0
         while "does not send MAVLink" not in caplog.text and time.monotonic() < end:
             time.sleep(0.01)
         with socket.create_connection(address) as px4:
-            assert is_ended(stranger)
+            assert is_ended(client)
             px4.sendall(HilLink(1).heartbeat())
             while not bridge._sessions[0].has_received and time.monotonic() < end:
                 time.sleep(0.01)
             with socket.create_connection(address) as second:
                 assert is_ended(second)
             assert bridge.connected == ("uav1",)
-    told = [text for text in caplog.messages if "does not send MAVLink" in text]
-    assert told == ["uav1: the connected client does not send MAVLink; connect a PX4"]
+    texts = [text for text in caplog.messages if "does not send MAVLink" in text]
+    assert texts == ["uav1: the connected client does not send MAVLink; connect a PX4"]
     assert "uav1: its PX4 is connected already; another connection is closed" in caplog.messages
 
 
@@ -147,11 +147,11 @@ def test_a_silent_one_ends_the_run_with_an_error(opened, silence):
     silence.autopilot = autopilot = StandIn(bridge.ports[0], 50, falls_silent=True)
     meet(simulation, bridge, 1)
     start(simulation, bridge._sessions, autopilot)
-    with pytest.raises(PartnerError) as told:
+    with pytest.raises(PartnerError) as error:
         simulation.run(1.0)
-    told_s = round(autopilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
-    assert str(told.value) == (
-        f"partner 'px4_of_uav1' did not answer within 0.5 s of wall time at {told_s:.3f} s"
+    reported_s = round(autopilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
+    assert str(error.value) == (
+        f"partner 'px4_of_uav1' did not answer within 0.5 s of wall time at {reported_s:.3f} s"
     )
     autopilot.close()
 
@@ -167,8 +167,8 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
         simulation.run(1.0)
     assert simulation.time_s == pytest.approx(begun_s + 1.0)
     assert len(autopilot.sensors) == 50
-    told = "uav1: its autopilot has been silent for 0.5 s; the simulation goes on without it"
-    assert told in caplog.messages
+    text = "uav1: its autopilot has been silent for 0.5 s; the simulation goes on without it"
+    assert text in caplog.messages
     silence.autopilot = again = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
     start(simulation, bridge._sessions, again)
@@ -179,7 +179,7 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
 
 
 def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
-    """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
+    """As PX4 in Offboard without setpoints: it responds again when time has gone on."""
     simulation, bridge = opened()
     autopilot = StandIn(bridge.ports[0], 50, arm_at=1000, dozes=100)
     meet(simulation, bridge, 1)
@@ -189,8 +189,10 @@ def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, capl
     if autopilot.fault:
         raise autopilot.fault
     assert len(autopilot.sensors) == 200
-    told = {text for text in caplog.messages if "silent" in text}
-    assert told == {"uav1: its autopilot is disarmed and silent; the simulation goes on without it"}
+    texts = {text for text in caplog.messages if "silent" in text}
+    assert texts == {
+        "uav1: its autopilot is disarmed and silent; the simulation goes on without it"
+    }
 
 
 def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened, silence):
@@ -267,7 +269,7 @@ def test_one_on_a_serial_line_flies_the_uav_that_is_left():
         assert str(autopilot.fault) == "the simulator closed the connection"
 
 
-def test_a_serial_line_that_is_too_slow_is_told():
+def test_a_serial_line_that_is_too_slow_is_reported():
     simulation = Simulation(scenario(), threads=1)
     with simulation, BridgeHost(simulation.gateway) as bridges:
         with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; use 230400 or more"):
@@ -276,21 +278,21 @@ def test_a_serial_line_that_is_too_slow_is_told():
             bridges.open(Px4SerialBridge("/dev/null"))
 
 
-def test_a_port_that_is_taken_is_told():
+def test_a_port_that_is_taken_is_reported():
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
         simulation = Simulation(scenario(), threads=1)
         with simulation, BridgeHost(simulation.gateway) as bridges:
-            with pytest.raises(BridgeError) as told:
+            with pytest.raises(BridgeError) as error:
                 bridges.open(Px4Bridge(port=port))
-            assert str(told.value) == (
+            assert str(error.value) == (
                 f"uav1: cannot listen on 127.0.0.1:{port}: the port is taken"
             )
 
 
-def test_an_imu_that_nobody_chose_is_a_calibrated_one():
+def test_a_default_imu_is_a_calibrated_one():
     chosen = {"kind": "imu", "model": "adis16448"}
     data = {
         "name": "three_types",
@@ -311,30 +313,30 @@ def test_an_imu_that_nobody_chose_is_a_calibrated_one():
     }
 
 
-def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeypatch):
+def test_in_step_the_simulation_sends_and_wakes_no_thread(opened, monkeypatch):
     simulation, bridge = opened()
-    tellers = []
-    tell = HilSession.send_sensors
+    senders = []
+    send = HilSession.send_sensors
 
-    def told(session, time_ns, news):
-        if session.taken:
-            tellers.append((threading.get_ident(), session._link.locked))
-        return tell(session, time_ns, news)
+    def record(session, time_ns, news):
+        if session.is_connected:
+            senders.append((threading.get_ident(), session._link.locked))
+        return send(session, time_ns, news)
 
-    monkeypatch.setattr(HilSession, "send_sensors", told)
+    monkeypatch.setattr(HilSession, "send_sensors", record)
     autopilot = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
     start(simulation, bridge._sessions, autopilot)
     simulation.run(1.0)
     assert autopilot.done.wait(60.0)
     assert autopilot.fault is None
-    in_step = [thread for thread, locked in tellers if locked]
+    in_step = [thread for thread, locked in senders if locked]
     assert len(in_step) > 30
     assert set(in_step[2:]) == {threading.get_ident()}  # the first was on its way to the loop
-    assert threading.get_ident() not in {thread for thread, locked in tellers if not locked}
+    assert threading.get_ident() not in {thread for thread, locked in senders if not locked}
 
 
-def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch, caplog):
+def test_values_that_cannot_be_sent_are_reported_and_the_run_goes_on(opened, monkeypatch, caplog):
     simulation, bridge = opened()
 
     def refuse(_link, _time_ns, _sensed):
@@ -346,11 +348,11 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     autopilot.close()
-    told = [text for text in caplog.messages if "cannot send sensor values" in text]
-    assert told == ["uav1: cannot send sensor values to its autopilot: infinity is no integer"]
+    texts = [text for text in caplog.messages if "cannot send sensor values" in text]
+    assert texts == ["uav1: cannot send sensor values to its autopilot: infinity is no integer"]
 
 
-def test_who_was_let_go_is_not_obeyed(opened):
+def test_a_released_client_is_not_obeyed(opened):
     simulation, bridge = opened()
     autopilot = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
@@ -359,21 +361,21 @@ def test_who_was_let_go_is_not_obeyed(opened):
     session._lock_step.turn_rotors = session._lock_step.go_on = lambda shares=None: asked.append(
         shares
     )
-    late = _Way()
-    hear = session.take(late)
-    answer = Codec(1, 1).pack(
+    late = _NullConnection()
+    receive = session.take(late)
+    response = Codec(1, 1).pack(
         dialect().MAVLink_hil_actuator_controls_message(10**9, [0.7] * 16, 129, 1), 0
     )
-    hear(answer)
+    receive(response)
     assert [len(shares) for shares in asked] == [16]
     session.leave("it went")
     asked.clear()
-    hear(answer)
+    receive(response)
     assert asked == []
     autopilot.close()
 
 
-class _Way:
+class _NullConnection:
     """Carries nothing."""
 
     is_for_any_thread = True
@@ -385,7 +387,7 @@ class _Way:
         """Nothing is there to be ended."""
 
 
-def test_a_px4_that_does_not_read_for_long_hears_whole_frames_again():
+def test_a_px4_that_does_not_read_for_long_receives_whole_frames_again():
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     frame = bytes(range(64))
@@ -401,20 +403,20 @@ def test_a_px4_that_does_not_read_for_long_hears_whole_frames_again():
     assert not connection.send(frame)
     for _ in range(3000):  # more than may wait: lost, whole
         connection.send(frame)
-    heard = _drained(theirs)
+    received = _drained(theirs)
     assert connection.send(frame)
-    heard += _drained(theirs)
-    assert len(heard) % 64 == 0
-    assert heard == frame * (len(heard) // 64)
-    assert sent < len(heard) // 64 < sent + 3000
+    received += _drained(theirs)
+    assert len(received) % 64 == 0
+    assert received == frame * (len(received) // 64)
+    assert sent < len(received) // 64 < sent + 3000
     ours.close()
     theirs.close()
 
 
 def _drained(line):
     line.setblocking(False)
-    heard = b""
+    received = b""
     with contextlib.suppress(BlockingIOError):
         while True:
-            heard += line.recv(1 << 16)
-    return heard
+            received += line.recv(1 << 16)
+    return received

@@ -12,8 +12,8 @@ from volery.vehicle.airframe import airframe_names, load_airframe, wrench_matrix
 def test_the_iris_is_that_of_px4s_gazebo():
     found = parameters_for(load_airframe("iris"))
     assert found["CA_ROTOR_COUNT"] == 4
-    places = [(found[f"CA_ROTOR{i}_PX"], found[f"CA_ROTOR{i}_PY"]) for i in range(4)]
-    assert places == [(0.13, 0.22), (-0.13, -0.20), (0.13, -0.22), (-0.13, 0.20)]
+    positions = [(found[f"CA_ROTOR{i}_PX"], found[f"CA_ROTOR{i}_PY"]) for i in range(4)]
+    assert positions == [(0.13, 0.22), (-0.13, -0.20), (0.13, -0.22), (-0.13, 0.20)]
     assert [found[f"CA_ROTOR{i}_KM"] for i in range(4)] == [0.06, 0.06, -0.06, -0.06]
     assert [found[f"PWM_MAIN_FUNC{i + 1}"] for i in range(4)] == [101, 102, 103, 104]
 
@@ -40,8 +40,8 @@ def test_px4s_allocation_has_the_airframes_effect(name):
     found = parameters_for(airframe)
     for i, column in enumerate(wrench_matrix(airframe).T):
         axis = np.array([found[f"CA_ROTOR{i}_A{k}"] for k in "XYZ"])
-        place = np.array([found[f"CA_ROTOR{i}_P{k}"] for k in "XYZ"])
-        torque = np.cross(place, axis) - found[f"CA_ROTOR{i}_KM"] * axis
+        arm = np.array([found[f"CA_ROTOR{i}_P{k}"] for k in "XYZ"])
+        torque = np.cross(arm, axis) - found[f"CA_ROTOR{i}_KM"] * axis
         flip = np.array([1.0, -1.0, -1.0])
         np.testing.assert_allclose(flip * column[:3], axis, atol=1e-5)
         np.testing.assert_allclose(flip * column[3:], torque, atol=1e-5)

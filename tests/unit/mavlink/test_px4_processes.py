@@ -1,4 +1,4 @@
-"""Starting, watching and ending PX4 instances, with a program in PX4's place."""
+"""Starting, watching and ending PX4 instances, with a program in place of PX4."""
 
 import contextlib
 import socket
@@ -39,7 +39,7 @@ sys.exit(3)
 
 
 def make_px4(folder, program):
-    """A build's folder with a program in PX4's place."""
+    """A build's folder with a program in place of PX4."""
     build = folder / "build/px4_sitl_default"
     airframes = build / "etc/init.d-posix/airframes"
     airframes.mkdir(parents=True)
@@ -71,11 +71,11 @@ def test_an_instance_connects_and_ends(tmp_path, simulator):
     with link:
         link.settimeout(60.0)
         assert link.recv(1) == b""
-    said = (tmp_path / f"kept/instance_{number}/output.txt").read_text()
-    assert said == f"none_iris 127.0.0.1 ['-d', '{build / 'etc'}']\n"
+    output = (tmp_path / f"kept/instance_{number}/output.txt").read_text()
+    assert output == f"none_iris 127.0.0.1 ['-d', '{build / 'etc'}']\n"
 
 
-TELLS_PARAMETERS = """
+PRINTS_PARAMETERS = """
 import os, time
 for name in sorted(os.environ):
     if name.startswith("PX4_"):
@@ -84,23 +84,23 @@ for name in sorted(os.environ):
 
 
 def test_each_instance_gets_its_parameters_and_the_environments_come_first(tmp_path, monkeypatch):
-    make_px4(tmp_path, TELLS_PARAMETERS)
+    make_px4(tmp_path, PRINTS_PARAMETERS)
     monkeypatch.setenv("PX4_PARAM_MPC_THR_HOVER", "0.6")
     monkeypatch.setenv("PX4_HOME_LAT", "47.0")
     own = [{"CA_ROTOR_COUNT": 4, "MPC_THR_HOVER": 0.7}, {"CA_ROTOR0_PX": -0.159}]
     kept = tmp_path / "kept"
     with Px4Instances(find_px4(tmp_path), 2, first=NUMBER, folder=kept, parameters=own) as all_of:
         assert all_of.wait(60.0)
-    said = [(kept / f"instance_{NUMBER + k}/output.txt").read_text() for k in range(2)]
-    assert "PX4_PARAM_CA_ROTOR_COUNT 4\n" in said[0]
-    assert "PX4_PARAM_MPC_THR_HOVER 0.6\n" in said[0]
-    assert "ROTOR0" not in said[0]
-    assert "PX4_PARAM_CA_ROTOR0_PX -0.159\nPX4_PARAM_MPC_THR_HOVER 0.6\n" in said[1]
-    assert "HOME_LAT" not in said[0] + said[1]
+    output = [(kept / f"instance_{NUMBER + k}/output.txt").read_text() for k in range(2)]
+    assert "PX4_PARAM_CA_ROTOR_COUNT 4\n" in output[0]
+    assert "PX4_PARAM_MPC_THR_HOVER 0.6\n" in output[0]
+    assert "ROTOR0" not in output[0]
+    assert "PX4_PARAM_CA_ROTOR0_PX -0.159\nPX4_PARAM_MPC_THR_HOVER 0.6\n" in output[1]
+    assert "HOME_LAT" not in output[0] + output[1]
 
 
-@pytest.mark.skipif(established_ports() is None, reason="this system does not tell connections")
-def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
+@pytest.mark.skipif(established_ports() is None, reason="this system does not list connections")
+def test_an_instance_that_lost_its_simulation_restarts(tmp_path, simulator):
     make_px4(tmp_path, CONNECTS)
     with Px4Instances(find_px4(tmp_path), 1, first=simulator.number) as instances:
         first, _ = simulator.accept()
@@ -113,7 +113,7 @@ def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
         assert instances.failure is None
 
 
-def test_one_that_ends_by_itself_is_told(tmp_path):
+def test_one_that_ends_by_itself_is_reported(tmp_path):
     make_px4(tmp_path, FAILS)
     with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
         assert instances.wait(60.0)
@@ -122,7 +122,7 @@ def test_one_that_ends_by_itself_is_told(tmp_path):
     )
 
 
-def test_what_is_no_px4_is_told(tmp_path):
+def test_what_is_no_px4_is_reported(tmp_path):
     with pytest.raises(
         BridgeError, match="no such folder; --px4-dir needs the folder of PX4-Autopilot"
     ):
@@ -155,12 +155,12 @@ time.sleep(1000)
 """
 
 
-def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
-    said, end = make_px4(tmp_path, HANGS) / "bin/said", time.monotonic() + 60.0
-    is_over = lambda: said.exists() or time.monotonic() > end  # noqa: E731
+def test_one_that_never_connects_is_reported_with_its_last_output(tmp_path, monkeypatch):
+    output, end = make_px4(tmp_path, HANGS) / "bin/said", time.monotonic() + 60.0
+    is_over = lambda: output.exists() or time.monotonic() > end  # noqa: E731
     wall = SimpleNamespace(monotonic=lambda: 2.0 if is_over() else 0.0)
     monkeypatch.setattr("volery.cli.bridges.time", wall)
-    monkeypatch.setattr("volery.cli.bridges._LONGEST_START_S", 1.0)
+    monkeypatch.setattr("volery.cli.bridges._START_TIMEOUT_S", 1.0)
     uavs = {"uav1": SimpleNamespace(airframe=load_airframe("f450"))}
     options = RunOptions("hover", px4_dir=tmp_path)
     with (
@@ -168,6 +168,6 @@ def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypat
         _px4_instances(uavs, [Px4Bridge()], options),
     ):
         pass
-    told = str(error.value)
-    assert told.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
-    assert "within 1 s; last output:\n  INFO [init] waiting for something" in told
+    message = str(error.value)
+    assert message.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
+    assert "within 1 s; last output:\n  INFO [init] waiting for something" in message

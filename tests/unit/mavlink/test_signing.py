@@ -56,10 +56,10 @@ def test_pymavlink_takes_what_is_signed():
     frames = Framer().feed(data)
     assert len(frames) == 2
     for frame in frames:
-        heard = mav.decode(bytearray(frame.data))
-        assert heard.get_signed()
-        assert heard.get_link_id() == 7
-        assert heard.pitch == pytest.approx(0.2)
+        decoded = mav.decode(bytearray(frame.data))
+        assert decoded.get_signed()
+        assert decoded.get_link_id() == 7
+        assert decoded.pitch == pytest.approx(0.2)
         assert Parser().decode(frame.data).roll == pytest.approx(0.1)
 
 
@@ -71,10 +71,10 @@ def test_messages_that_pymavlink_lacks_are_signed_too():
     mav = development.MAVLink(None, 255, 190)
     mav.signing.secret_key, mav.signing.timestamp = KEY, STAMP
     mav.signing.allow_unsigned_callback = None
-    heard = mav.decode(bytearray(data))
-    assert heard.get_signed()
-    assert (heard.mode_index, heard.mode_name) == (message.mode_index, "Hold")
-    assert heard.number_modes == len(modes)
+    decoded = mav.decode(bytearray(data))
+    assert decoded.get_signed()
+    assert (decoded.mode_index, decoded.mode_name) == (message.mode_index, "Hold")
+    assert decoded.number_modes == len(modes)
 
 
 def test_what_pymavlink_signs_is_accepted_once():
@@ -95,7 +95,7 @@ def test_what_pymavlink_signs_is_accepted_once():
     ],
     ids=["unsigned", "another key", "more than a minute old"],
 )
-def test_strangers_are_refused_and_told_of_once(mav, why, caplog):
+def test_unknown_senders_are_refused_and_reported_once(mav, why, caplog):
     signing = ours()
     for _ in range(3):
         assert not signing.accepts(frame_of(mav))
@@ -115,7 +115,7 @@ def test_radios_have_no_key():
     assert ours().accepts(frame_of(station(None), status))
 
 
-def test_stamps_follow_the_newest_that_was_heard():
+def test_stamps_follow_the_newest_received():
     signing, mav = ours(), station(stamp=STAMP + 50_000_000)
     assert signing.accepts(frame_of(mav))
     data = signing.sign(Codec(1).pack(dialect().MAVLink_ping_message(0, 0, 0, 0), 0))
@@ -140,7 +140,7 @@ def test_a_key_is_the_text_of_a_file(tmp_path):
         key_of(tmp_path / "nowhere")
 
 
-def test_a_vehicle_hears_only_who_has_the_key(caplog, monkeypatch, tmp_path):
+def test_a_vehicle_obeys_only_clients_that_have_the_key(caplog, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(stamp_ledger, "_ledgers", {})
     simulation = Simulation(with_autopilots(irises(1)), threads=1)
@@ -151,8 +151,8 @@ def test_a_vehicle_hears_only_who_has_the_key(caplog, monkeypatch, tmp_path):
         simulation.gateway.use_low_latency()
         run.start()
         try:
-            with station_at(bridge.port, None) as stranger:
-                command(stranger)
+            with station_at(bridge.port, None) as client:
+                command(client)
                 end = time.monotonic() + 60.0
                 while not caplog.messages and time.monotonic() < end:
                     time.sleep(0.01)
@@ -163,7 +163,7 @@ def test_a_vehicle_hears_only_who_has_the_key(caplog, monkeypatch, tmp_path):
                     command(friend)
                     ack = friend.recv_match(type="COMMAND_ACK", blocking=True, timeout=60.0)
                     assert ack.get_signed()
-                assert stranger.recv_match(type="COMMAND_ACK") is None
+                assert client.recv_match(type="COMMAND_ACK") is None
         finally:
             simulation.clock.quit()
             run.join()
@@ -171,7 +171,7 @@ def test_a_vehicle_hears_only_who_has_the_key(caplog, monkeypatch, tmp_path):
 
 @contextlib.contextmanager
 def station_at(port, key):
-    """A station with this key, or without one, that has heard the vehicle."""
+    """A station with this key, or without one, that receives the vehicle."""
     link = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", source_system=245)
     try:
         if key is not None:
@@ -183,5 +183,5 @@ def station_at(port, key):
 
 
 def command(link):
-    """Ask for the vehicle's position."""
+    """Request the vehicle's position."""
     link.mav.command_long_send(1, 1, 512, 0, 242, 0, 0, 0, 0, 0, 0)

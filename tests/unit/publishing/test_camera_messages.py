@@ -18,13 +18,13 @@ TYPES = {"rgb8": ("u1", 3), "bgr8": ("u1", 3), "mono8": ("u1", 1), "32FC1": ("f4
 
 
 def as_array(image):
-    """A picture of a message by cv_bridge's rule: rows of `step` bytes in the stated byte order."""
+    """An image of a message by cv_bridge's rule: rows of `step` bytes in the stated byte order."""
     kind, channels = TYPES[image.encoding]
     number = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     shape = (image.height, image.width, channels)
     strides = (image.step, number.itemsize * channels, number.itemsize)
-    picture = np.ndarray(shape, number, bytes(image.data), strides=strides)
-    return picture[..., 0] if channels == 1 else picture
+    array = np.ndarray(shape, number, bytes(image.data), strides=strides)
+    return array[..., 0] if channels == 1 else array
 
 
 def scenario(**camera):
@@ -55,7 +55,7 @@ def look(simulate):
     return listen
 
 
-def test_raw_pictures_by_the_rules_of_cv_bridge(look):
+def test_raw_images_by_the_rules_of_cv_bridge(look):
     colour, depth, instance, material = map(
         as_array, look("image_raw", "depth", "labels/instance", "labels/material")
     )
@@ -89,7 +89,7 @@ def test_millimetres_of_what_is_not_known_are_zero():
     np.testing.assert_array_equal(millimetres(depth), [[0, 0, 0, 65535, 0, 1000]])
 
 
-def test_jpeg_is_the_picture_within_its_loss(look):
+def test_jpeg_is_the_image_within_its_loss(look):
     raw, packed = look("image_raw", "image_raw/compressed")
     (coarse,) = look("image_raw/compressed", jpeg_quality=20)
     assert packed.format == "rgb8; jpeg compressed bgr8"
@@ -101,7 +101,7 @@ def test_jpeg_is_the_picture_within_its_loss(look):
     assert packed.header == raw.header
 
 
-def test_png_is_the_picture(look):
+def test_png_is_the_image(look):
     raw, packed = look("image_raw", "image_raw/compressed", compressed="png")
     assert packed.format == "rgb8; png compressed bgr8"
     decoded = cv2.imdecode(packed.data, cv2.IMREAD_COLOR)
@@ -109,7 +109,7 @@ def test_png_is_the_picture(look):
 
 
 def unpacked(message):
-    """Kind and parameters of a compressedDepth message's header, and its 16-bit picture."""
+    """Kind and parameters of a compressedDepth message's header, and its 16-bit image."""
     data = bytes(message.data)
     png = np.frombuffer(data[12:], np.uint8)
     return struct.unpack("<iff", data[:12]), cv2.imdecode(png, cv2.IMREAD_UNCHANGED)
@@ -130,7 +130,7 @@ def test_compressed_depth_in_metres(look):
     assert (np.abs(back - depth[seen]) <= depth[seen] * back / a * 1.01).all()
 
 
-def test_compressed_depth_of_what_16_bits_do_not_reach_is_unknown():
+def test_compressed_depth_beyond_16_bits_is_unknown():
     depth = np.array([[0.1, 0.2, 199.0, 200.0, np.nan, np.inf, -np.inf]], np.float32)
     data = bytes(image_codecs.packed_metres(depth, 200.0))
     coded = cv2.imdecode(np.frombuffer(data[12:], np.uint8), cv2.IMREAD_UNCHANGED)
@@ -173,12 +173,12 @@ def test_points_stand_where_the_pixels_see(look, points):
 
 def test_only_what_somebody_receives_is_coded(look, monkeypatch):
     def refuse(*_arguments):
-        raise AssertionError("nobody wanted this")
+        raise AssertionError("not requested")
 
     for name in ("jpeg", "png", "packed_metres", "packed_millimetres"):
         monkeypatch.setattr(image_codecs, name, refuse)
     look("image_raw", "depth", points="xyzrgb")
-    with pytest.raises(AssertionError, match="nobody wanted"):
+    with pytest.raises(AssertionError, match="not requested"):
         look("image_raw/compressed")
 
 
@@ -227,7 +227,7 @@ def test_the_lens_is_opencvs(distortion):
     np.testing.assert_allclose(pixels[:, 0], np.stack([u, v], -1), atol=1e-3)
 
 
-def test_an_undistorted_picture_is_that_of_an_ideal_lens(look, tmp_path):
+def test_an_undistorted_image_is_that_of_an_ideal_lens(look, tmp_path):
     """cv2 rectifies by CameraInfo what a distorting lens saw; an ideal lens sees the same."""
     model = tmp_path / "wide.toml"
     model.write_text(f'name = "wide"\nwidth = 320\nheight = 240\ndistortion = {list(LENS)}\n')
@@ -244,8 +244,8 @@ def test_an_undistorted_picture_is_that_of_an_ideal_lens(look, tmp_path):
     assert np.abs(rectified.astype(int) - same.astype(int)).max() <= 3
     inner = (slice(30, 210), slice(40, 280))
 
-    def off(picture):
-        return np.abs(picture[inner].astype(int) - as_array(ideal)[inner].astype(int)).mean()
+    def off(image):
+        return np.abs(image[inner].astype(int) - as_array(ideal)[inner].astype(int)).mean()
 
     assert off(rectified) < 0.5 * off(as_array(seen))
     assert off(rectified) < 4.0

@@ -37,7 +37,7 @@ def test_transforms_of_odometry():
     assert all(one is other for one, other in zip(read, message.transforms, strict=True))
 
 
-def test_a_template_is_filled_anew_for_each_message():
+def test_a_template_is_filled_for_each_message():
     frames = FRAMES[:50]
     first = np.random.default_rng(1).normal(size=(50, 7))
     data = published(transforms_in_map(10**9, frames, first)).cdr

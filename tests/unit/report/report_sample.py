@@ -56,7 +56,7 @@ def sample_flight(uavs: int = 3, seconds: float = 180.0, *, contacts: int = 1) -
         0.25,
         7200,
     )
-    where = tuple(float(v) for v in tracks[0].position_map[-1])
+    position = tuple(float(v) for v in tracks[0].position_map[-1])
     events = [
         FlightEvent(0.0, "mode", "0.000 s  uav1 take off at (60.0, 120.0, 121.0) m"),
         *[
@@ -64,7 +64,7 @@ def sample_flight(uavs: int = 3, seconds: float = 180.0, *, contacts: int = 1) -
                 seconds,
                 "collision",
                 f"{seconds:.3f} s  uav1 hit tree 812 at 2.10 m/s",
-                (where[0], where[1], where[2]),
+                (position[0], position[1], position[2]),
             )
             for _ in range(contacts)
         ],

@@ -1,4 +1,4 @@
-"""Reports of logs: ways, errors, trunks, and a real flight over the simulated one."""
+"""Reports of logs: trajectories, errors, trunks, and a real flight over the simulated one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from volery.core import rotations
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
 from volery.graph.codecs.zero import zero_message
-from volery.report.logged_flights import read_flight, read_way
+from volery.report.logged_flights import read_flight, read_trajectory
 from volery.report.page import ReportError
 from volery.report.trajectory_page import write_log_report
 
@@ -26,25 +26,25 @@ OFF = np.array([0.3, -0.4, 0.0])
 """How far the estimate is off."""
 
 
-def place_at(seconds: float) -> np.ndarray:
+def position_at(seconds: float) -> np.ndarray:
     return np.array([0.5 * seconds + np.sin(0.7 * seconds), 2.0 * np.sin(0.2 * seconds), 3.0])
 
 
-def odometry(time_ns: int, place: np.ndarray) -> Any:
+def odometry(time_ns: int, position: np.ndarray) -> Any:
     message = zero_message("nav_msgs/msg/Odometry")
     message.header = m.header(time_ns, "map")
-    message.pose.pose = m.Pose(m.Point(*place.tolist()), m.Quaternion(0.0, 0.0, 0.0, 1.0))
+    message.pose.pose = m.Pose(m.Point(*position.tolist()), m.Quaternion(0.0, 0.0, 0.0, 1.0))
     return message
 
 
-def scan_at(time_ns: int, place: np.ndarray) -> Any:
-    """Trunks of 15 cm radius before a wall that is out of reach."""
+def scan_at(time_ns: int, position: np.ndarray) -> Any:
+    """Trunks of 15 cm radius before a wall that is out of range."""
     scan = zero_message("sensor_msgs/msg/LaserScan")
     scan.header = m.header(time_ns, "laser")
     scan.angle_min, scan.angle_increment = np.radians(-135.0), np.radians(0.25)
     angles = scan.angle_min + scan.angle_increment * np.arange(1081)
     ranges = np.full(1081, np.inf, np.float32)
-    for tree in TREES - place[:2]:
+    for tree in TREES - position[:2]:
         along = tree @ [np.cos(angles), np.sin(angles)]
         aside = np.abs(tree @ [-np.sin(angles), np.cos(angles)])
         hit = (aside < 0.15) & (along > 0.0)
@@ -60,11 +60,11 @@ def _log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with closing(create_log(path)) as log:
         for k in range(0, 1200):
             time_ns = k * S // 20
-            place = place_at(k / 20.0)
-            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, place))
-            write(log, "/uav1/odom", time_ns, odometry(time_ns, place + OFF))
+            position = position_at(k / 20.0)
+            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, position))
+            write(log, "/uav1/odom", time_ns, odometry(time_ns, position + OFF))
             if k % 10 == 0:
-                scan = scan_at(time_ns, place)
+                scan = scan_at(time_ns, position)
                 write(log, "/uav1/laser/horizontal/scan", time_ns, scan)
             write(log, "/uav1/other", time_ns, m.String("x"))
     return path
@@ -74,7 +74,7 @@ def write(log: Any, topic: str, time_ns: int, message: Any) -> None:
     log.write(m.Published(topic, m.type_name(type(message)), time_ns, message))
 
 
-def test_ways_and_trunks_of_a_log(log: Path) -> None:
+def test_trajectories_and_trunks_of_a_log(log: Path) -> None:
     (uav,) = read_flight(log).uavs
     assert uav.name == "uav1"
     assert uav.truth is not None
@@ -86,7 +86,7 @@ def test_ways_and_trunks_of_a_log(log: Path) -> None:
     assert away.min(axis=1).max() < 0.08
 
 
-def test_the_page_tells_the_error(log: Path, tmp_path: Path) -> None:
+def test_the_page_shows_the_error(log: Path, tmp_path: Path) -> None:
     page = write_log_report(log, tmp_path / "new").path.read_text(encoding="utf-8")
     assert "error 0.50 m without, 0.00 m after" in page
     assert page.count("<svg") == 3
@@ -104,18 +104,18 @@ def test_an_older_report_is_replaced_only_if_asked(log: Path, tmp_path: Path) ->
     assert "<svg" in write_log_report(log, tmp_path, overwrite=True).path.read_text()
 
 
-def test_a_uav_that_is_not_there_is_told(log: Path, tmp_path: Path) -> None:
+def test_a_uav_that_is_not_there_is_reported(log: Path, tmp_path: Path) -> None:
     with pytest.raises(VoleryError, match="no UAV uav9; known: uav1"):
         write_log_report(log, tmp_path / "none", uav="uav9")
     assert not (tmp_path / "none").exists()
 
 
 def test_the_scenario_is_named(log: Path, tmp_path: Path) -> None:
-    told, path = {"name": "glade", "content": {"name": "glade"}}, tmp_path / "flight.mcap"
+    origin, path = {"name": "glade", "content": {"name": "glade"}}, tmp_path / "flight.mcap"
     with closing(create_log(path)) as out:
-        write(out, "/volery/scenario", 0, m.String(json.dumps(told)))
-        write(out, "/uav1/odom", 0, odometry(0, place_at(0.0)))
-        write(out, "/uav2/odom", 4 * S, odometry(4 * S, place_at(4.0)))
+        write(out, "/volery/scenario", 0, m.String(json.dumps(origin)))
+        write(out, "/uav1/odom", 0, odometry(0, position_at(0.0)))
+        write(out, "/uav2/odom", 4 * S, odometry(4 * S, position_at(4.0)))
     page = write_log_report(path, tmp_path / "out").path.read_text()
     assert '<p class="lead">Scenario glade, 4.0 s with 2 UAVs.</p>' in page
     one = write_log_report(path, tmp_path / "one", uav="uav2").path.read_text()
@@ -123,16 +123,16 @@ def test_the_scenario_is_named(log: Path, tmp_path: Path) -> None:
     assert "<h2>uav1</h2>" not in one
 
 
-def told_log(path: Path, content: dict[str, Any], trees: Path | None = None) -> Path:
-    """The same minute, of a scenario that the log tells."""
-    told = {"name": "glade", "seed": 1, "version": "0", "folder": trees and str(trees)}
+def log_with_scenario(path: Path, content: dict[str, Any], trees: Path | None = None) -> Path:
+    """The same minute, of a scenario that the log holds."""
+    origin = {"name": "glade", "seed": 1, "version": "0", "folder": trees and str(trees)}
     with closing(create_log(path)) as out:
-        write(out, "/volery/scenario", 0, m.String(json.dumps(told | {"content": content})))
+        write(out, "/volery/scenario", 0, m.String(json.dumps(origin | {"content": content})))
         for k in range(0, 1200):
             time_ns = k * S // 20
-            write(out, "/uav1/odom", time_ns, odometry(time_ns, place_at(k / 20.0)))
+            write(out, "/uav1/odom", time_ns, odometry(time_ns, position_at(k / 20.0)))
             if k % 10 == 0:
-                scan = scan_at(time_ns, place_at(k / 20.0))
+                scan = scan_at(time_ns, position_at(k / 20.0))
                 write(out, "/uav1/laser/horizontal/scan", time_ns, scan)
     return path
 
@@ -149,7 +149,7 @@ def test_the_true_trunks_are_drawn_beside_the_mapped_ones(tmp_path: Path) -> Non
             "forest": {"kind": "inventory", "file": "trees.csv", "species": "snag"},
         },
     }
-    log = told_log(tmp_path / "flight.mcap", content, tmp_path)
+    log = log_with_scenario(tmp_path / "flight.mcap", content, tmp_path)
     page = write_log_report(log, tmp_path / "out").path.read_text()
     assert "Rings: 3 trees of the scenario within 15 m" in page
     assert "100% of the mapped trunks are within 0.5 m of one" in page
@@ -159,18 +159,18 @@ def test_the_true_trunks_are_drawn_beside_the_mapped_ones(tmp_path: Path) -> Non
     assert "The scenario&#x27;s trees cannot be generated again: " in page
     assert ">true trunks<" not in page
     del content["world"]["forest"]
-    bare = told_log(tmp_path / "bare.mcap", content)
+    bare = log_with_scenario(tmp_path / "bare.mcap", content)
     page = write_log_report(bare, tmp_path / "bare").path.read_text()
     assert "The scenario has no trees." in page
 
 
-def test_a_log_without_scenario_tells_no_true_trunks(log: Path, tmp_path: Path) -> None:
+def test_a_log_without_scenario_shows_no_true_trunks(log: Path, tmp_path: Path) -> None:
     page = write_log_report(log, tmp_path / "out").path.read_text()
     assert "The log holds no scenario" in page
     assert ">true trunks<" not in page
 
 
-def test_logs_that_are_cut_are_told(log: Path, tmp_path: Path) -> None:
+def test_logs_that_are_cut_are_reported(log: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size * 9 // 10])
     why = "cut.mcap: cut off in the middle of a chunk"
@@ -190,27 +190,27 @@ def test_a_topic_to_compare_needs_a_log(log: Path, tmp_path: Path) -> None:
         write_log_report(log, tmp_path / "none", compare_topic="/odom")
 
 
-def test_a_similar_flight_is_told(log: Path, tmp_path: Path) -> None:
+def test_a_similar_flight_is_reported(log: Path, tmp_path: Path) -> None:
     """As another UAV flies on a mission that begins alike."""
     real = tmp_path / "real.mcap"
     with closing(create_log(real)) as out:
         for k in range(1200):
             t, time_ns = k / 20.0, k * S // 20
-            place = place_at(t) + np.array([0.0, 0.35 * np.sin(1.1 * t), 0.0])
-            write(out, "/odom", time_ns, odometry(time_ns, place))
+            position = position_at(t) + np.array([0.0, 0.35 * np.sin(1.1 * t), 0.0])
+            write(out, "/odom", time_ns, odometry(time_ns, position))
     written = write_log_report(log, tmp_path / "out", compare=real)
     (alike,) = re.findall(r"correlation of speeds (\S+),", written.fit)
     assert 0.8 < float(alike) < 0.95
     assert any("the speeds differ" in text for text in written.warnings)
 
 
-def test_times_of_day_are_told_as_such(log: Path, tmp_path: Path) -> None:
+def test_times_of_day_are_shown_as_such(log: Path, tmp_path: Path) -> None:
     """Of a real log over a simulated one, and over itself."""
     real, begin_s = tmp_path / "real.mcap", 1_700_000_000
     with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = begin_s * S + k * S // 20
-            write(out, "/uav1/odom", time_ns, odometry(time_ns, place_at((k + 100) / 20.0)))
+            write(out, "/uav1/odom", time_ns, odometry(time_ns, position_at((k + 100) / 20.0)))
     page = write_log_report(log, tmp_path / "one", compare=real).path.read_text()
     assert "so that 2023-11-14 22:13:20 UTC, its beginning, is 5.00 s" in page
     page = write_log_report(real, tmp_path / "other").path.read_text()
@@ -218,7 +218,7 @@ def test_times_of_day_are_told_as_such(log: Path, tmp_path: Path) -> None:
     assert "1.7" not in "".join(re.findall(r">([^<>]*)</text>", page))
 
 
-def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
+def test_a_goal_is_no_position(tmp_path: Path) -> None:
     path = tmp_path / "real.mcap"
     with closing(create_log(path)) as out:
         for topic in ("/mavros/local_position/pose", "/mavros/setpoint_position/local", "/goal"):
@@ -226,21 +226,21 @@ def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
             pose.header = m.header(S, "map")
             out.write(m.Published(topic, "geometry_msgs/msg/PoseStamped", S, pose))
         write(out, "/chat", S, m.String("x"))
-    assert len(read_way(path).way.time_s) == 1
+    assert len(read_trajectory(path).trajectory.time_s) == 1
     offered = r"Topics with poses: /mavros/local_position/pose$"
     with pytest.raises(VoleryError, match=r"/chat holds no poses: it is a std_msgs/msg/String\. "):
-        read_way(path, "/chat")
+        read_trajectory(path, "/chat")
     with pytest.raises(VoleryError, match=offered):
-        read_way(path, "/none")
-    assert len(read_way(path, "/goal").way.time_s) == 1  # who asks for it gets it
+        read_trajectory(path, "/none")
+    assert len(read_trajectory(path, "/goal").trajectory.time_s) == 1  # on request it is read
 
 
-def test_a_flight_that_is_another_one_is_told(log: Path, tmp_path: Path) -> None:
+def test_a_flight_that_is_another_one_is_reported(log: Path, tmp_path: Path) -> None:
     real, random = tmp_path / "real.mcap", np.random.default_rng(3)
-    way = np.cumsum(random.normal(0.0, 0.3, (600, 3)), axis=0)
+    trajectory = np.cumsum(random.normal(0.0, 0.3, (600, 3)), axis=0)
     with closing(create_log(real)) as out:
-        for k, place in enumerate(way):
-            write(out, "/odom", (k + 1) * S // 20, odometry((k + 1) * S // 20, place))
+        for k, position in enumerate(trajectory):
+            write(out, "/odom", (k + 1) * S // 20, odometry((k + 1) * S // 20, position))
     written = write_log_report(log, tmp_path / "out", compare=real)
     assert any("it may be another flight" in text for text in written.warnings)
     assert '<p class="note">real.mcap: it may be another flight' in written.path.read_text()
@@ -253,14 +253,14 @@ def test_a_flight_laid_over_itself_is_moved_by_nothing(log: Path, tmp_path: Path
 
 
 def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
-    """The same way, elsewhere, turned, at another hour, with noise of 0.1 m."""
+    """The same trajectory, elsewhere, turned, at another hour, with noise of 0.1 m."""
     real, turn = tmp_path / "real.bag", rotations.matrix(rotations.from_rpy(0.0, 0.0, 1.1))
     noise = np.random.default_rng(2).normal(0.0, 0.1, (1000, 3))
     with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = (k + 5000) * S // 20
-            place = (place_at((k + 100) / 20.0) + noise[k]) @ turn.T + [40.0, 7.0, 1.0]
-            write(out, "/mavros/odom", time_ns, odometry(time_ns, place))
+            position = (position_at((k + 100) / 20.0) + noise[k]) @ turn.T + [40.0, 7.0, 1.0]
+            write(out, "/mavros/odom", time_ns, odometry(time_ns, position))
     written = write_log_report(log, tmp_path / "out", compare=real)
     assert written.warnings == []
     page = written.path.read_text(encoding="utf-8")
@@ -272,16 +272,16 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
     with pytest.raises(VoleryError, match="no UAV uav7; known: uav1"):
         write_log_report(log, tmp_path, compare=real, uav="uav7")
     with pytest.raises(VoleryError, match=r"there is no /odom\. Topics with poses: /mavros/odom"):
-        read_way(real, "/odom")
+        read_trajectory(real, "/odom")
 
 
-def test_a_clock_that_was_set_in_flight_is_told(log: Path, tmp_path: Path) -> None:
-    """As that of a computer without a battery for it, until it hears of the time."""
+def test_a_clock_that_was_set_in_flight_is_reported(log: Path, tmp_path: Path) -> None:
+    """As that of a computer without a battery for it, until it receives the time."""
     real = tmp_path / "real.bag"
     with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = k * S // 20 + (k > 500) * 1_700_000_000 * S
-            write(out, "/mavros/odom", time_ns, odometry(time_ns, place_at(k / 20.0)))
+            write(out, "/mavros/odom", time_ns, odometry(time_ns, position_at(k / 20.0)))
     with pytest.raises(VoleryError, match="span 472222 hours; was its clock set"):
         write_log_report(log, tmp_path / "out", compare=real)
 
@@ -293,11 +293,11 @@ def test_a_log_without_uavs(tmp_path: Path) -> None:
     with pytest.raises(VoleryError, match="the log holds no UAV's poses"):
         read_flight(path)
     with pytest.raises(VoleryError, match="Topics with poses: none"):
-        read_way(path)
+        read_trajectory(path)
 
 
 def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
-    """As filters tell that have lost their way."""
+    """As filters report that have diverged."""
     path = tmp_path / "lost.mcap"
     with closing(create_log(path)) as log:
         for k in range(20):
@@ -306,22 +306,24 @@ def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
             pose.pose.position.x = float("nan") if k % 4 == 3 else float(k)
             time_ns = (k + 1) * 100_000_000
             log.write(m.Published("/pose", "geometry_msgs/msg/PoseStamped", time_ns, pose))
-    way = read_way(path).way
-    assert len(way.time_s) == 15
-    assert np.isfinite(way.position).all()
+    trajectory = read_trajectory(path).trajectory
+    assert len(trajectory.time_s) == 15
+    assert np.isfinite(trajectory.position).all()
 
 
-def test_what_slam_tells_is_the_estimate(tmp_path: Path) -> None:
+def test_what_slam_publishes_is_the_estimate(tmp_path: Path) -> None:
     """Where it is recorded, in the place of the odometry."""
     path = tmp_path / "flight.mcap"
     with closing(create_log(path)) as log:
         for k in range(100):
-            time_ns, place = (k + 1) * S // 10, place_at(k / 10.0)
-            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, place))
-            write(log, "/uav1/odom", time_ns, odometry(time_ns, place + np.array([5.0, 0.0, 0.0])))
+            time_ns, position = (k + 1) * S // 10, position_at(k / 10.0)
+            write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, position))
+            write(
+                log, "/uav1/odom", time_ns, odometry(time_ns, position + np.array([5.0, 0.0, 0.0]))
+            )
             pose = zero_message("geometry_msgs/msg/PoseWithCovarianceStamped")
             pose.header = m.header(time_ns, "map")
-            pose.pose.pose = odometry(time_ns, place + OFF).pose.pose
+            pose.pose.pose = odometry(time_ns, position + OFF).pose.pose
             write(log, "/uav1/slam/pose", time_ns, pose)
     (uav,) = read_flight(path).uavs
     assert uav.estimate is not None

@@ -112,9 +112,9 @@ def wall_scan(topic: str, start_ns: int) -> Any:
     direction = rotations.rotate(q, rotations.rotate(mount.attitude_body, d))
     origin = p + rotations.rotate(q, mount.position_body)
     ahead = direction[:, 0] > 1e-6
-    reach = np.full(beams, np.inf)
-    reach[ahead] = (30.0 - origin[ahead, 0]) / direction[ahead, 0]
-    ranges = np.where(reach < 27.0, reach, np.inf).astype(np.float32)
+    distance = np.full(beams, np.inf)
+    distance[ahead] = (30.0 - origin[ahead, 0]) / direction[ahead, 0]
+    ranges = np.where(distance < 27.0, distance, np.inf).astype(np.float32)
     return m.LaserScan(
         m.header(start_ns, "laser"),
         -2.35619449,
@@ -157,10 +157,10 @@ def test_points_of_a_cloud_return_to_the_wall() -> None:
     beam = np.stack([np.cos(azimuth), np.sin(azimuth), 0.1 * np.sin(9 * azimuth)], axis=-1)
     p, q = pose_at(t)
     origin, direction = p + rotations.rotate(q, mount.position_body), rotations.rotate(q, beam)
-    reach = (20.0 - origin[:, 0]) / direction[:, 0]
+    distance = (20.0 - origin[:, 0]) / direction[:, 0]
     points = np.zeros(500, POINT)
     for i, axis in enumerate("xyz"):
-        points[axis] = reach * beam[:, i]
+        points[axis] = distance * beam[:, i]
     points["time"] = t - t[0]
     fields = [m.PointField("x", 0, m.PointField.FLOAT32, 1)]
     cloud = m.PointCloud2(

@@ -85,8 +85,8 @@ def test_the_page_draws_the_team(log: Path, tmp_path: Path) -> None:
     assert "a search begins" in of_team
     paths = [each.truth.position for each in flight.uavs if each.truth is not None]
     pairs = itertools.combinations(paths, 2)
-    least = min(np.linalg.norm(one - other, axis=1).min() for one, other in pairs)
-    assert f"included: {least:.2f} m at" in of_team
+    min_distance = min(np.linalg.norm(one - other, axis=1).min() for one, other in pairs)
+    assert f"included: {min_distance:.2f} m at" in of_team
     used = sum(each.energy_j for each in flight.uavs) / 3600.0
     assert 1.0 < used < 20.0  # three F450s for half a minute
     assert f"{used:.1f} Wh in all" in of_team

@@ -21,36 +21,36 @@ def surveyed(*, nodding: bool) -> tuple[TrunkSurvey, RecordedTrajectory]:
     survey, rows = TrunkSurvey(), []
     for k in range(1, 101):
         time_ns = k * S // 20
-        place = np.array([0.0, 0.5 * math.sin(0.1 * k), HEIGHT_M])
-        rows.append((time_ns / S, *place, *rotations.IDENTITY))
-        survey.add_scan(LEVEL, time_ns, scan_message("level", time_ns, seen_from(place, 0.0)))
+        position = np.array([0.0, 0.5 * math.sin(0.1 * k), HEIGHT_M])
+        rows.append((time_ns / S, *position, *rotations.IDENTITY))
+        survey.add_scan(LEVEL, time_ns, scan_message("level", time_ns, seen_from(position, 0.0)))
         if nodding:
             angle = 0.8 * math.sin(0.3 * k)
             survey.add_nods(nods_message(time_ns, angle))
-            ranges = seen_from(place, angle)
+            ranges = seen_from(position, angle)
             survey.add_scan(NODDING, time_ns, scan_message("nodding", time_ns, ranges))
     return survey, RecordedTrajectory.of_rows(rows)
 
 
 def test_a_crown_in_the_air_is_no_trunk() -> None:
-    survey, way = surveyed(nodding=True)
+    survey, trajectory = surveyed(nodding=True)
     assert survey.is_founded
-    (trunk,) = survey.trunks(way).seen_often
+    (trunk,) = survey.trunks(trajectory).seen_often
     np.testing.assert_allclose(trunk, [TRUNK.x, TRUNK.y, HEIGHT_M], atol=0.05)
 
 
 def test_without_a_nodding_lidar_shapes_alone_count() -> None:
-    survey, way = surveyed(nodding=False)
+    survey, trajectory = surveyed(nodding=False)
     assert not survey.is_founded
-    assert len(survey.trunks(way).seen_often) == 2
+    assert len(survey.trunks(trajectory).seen_often) == 2
 
 
-def test_nothing_is_known_of_a_way_that_is_unknown() -> None:
-    survey, way = surveyed(nodding=True)
+def test_an_unknown_trajectory_gives_no_trunks() -> None:
+    survey, trajectory = surveyed(nodding=True)
     before = RecordedTrajectory.of_rows(
-        [(s - 100.0, *p, *a) for s, p, a in zip(*vars(way).values(), strict=True)]
+        [(s - 100.0, *p, *a) for s, p, a in zip(*vars(trajectory).values(), strict=True)]
     )
-    assert len(survey.trunks(before).places) == 0
+    assert len(survey.trunks(before).positions) == 0
 
 
 def test_a_rise_of_the_ground_is_no_trunk() -> None:

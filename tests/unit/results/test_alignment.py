@@ -1,4 +1,4 @@
-"""Alignment of ways in space and time, and the trunk map that poses are measured by."""
+"""Alignment of trajectories in space and time, and the trunk map that poses are measured by."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from volery.results.alignment import at_times, ate_rmse_m, common_times, time_sh
 ANGLES = st.floats(-3.0, 3.0)
 
 
-def way_of(seconds: float, rate_hz: float = 20.0, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
-    """A way with stops and turns."""
+def path_of(seconds: float, rate_hz: float = 20.0, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """A path with stops and turns."""
     time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
     random = np.random.default_rng(seed)
     knots = random.uniform(-1.0, 1.0, (int(seconds // 3) + 2, 3)).cumsum(axis=0) * 3.0
@@ -23,33 +23,33 @@ def way_of(seconds: float, rate_hz: float = 20.0, seed: int = 4) -> tuple[np.nda
 
 
 @given(ANGLES, ANGLES, ANGLES)
-def test_a_moved_way_is_brought_back(roll: float, pitch: float, yaw: float) -> None:
-    _, way = way_of(30.0)
+def test_a_moved_path_is_aligned(roll: float, pitch: float, yaw: float) -> None:
+    _, path = path_of(30.0)
     turn = rotations.matrix(rotations.from_rpy(roll, pitch, yaw))
-    found = umeyama(way, way @ turn.T + [3.0, -2.0, 1.0])
+    found = umeyama(path, path @ turn.T + [3.0, -2.0, 1.0])
     np.testing.assert_allclose(found.rotation, turn, atol=1e-9)
     np.testing.assert_allclose(found.translation, [3.0, -2.0, 1.0], atol=1e-8)
 
 
-def test_a_mirrored_way_is_turned_and_not_mirrored() -> None:
-    _, way = way_of(30.0)
-    assert np.linalg.det(umeyama(way, way * [1.0, 1.0, -1.0]).rotation) == pytest.approx(1.0)
+def test_a_mirrored_path_is_rotated_and_not_mirrored() -> None:
+    _, path = path_of(30.0)
+    assert np.linalg.det(umeyama(path, path * [1.0, 1.0, -1.0]).rotation) == pytest.approx(1.0)
 
 
 def test_what_is_left_is_the_noise() -> None:
-    _, way = way_of(200.0)
-    noise = np.random.default_rng(1).normal(0.0, 0.2, way.shape)
+    _, path = path_of(200.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.2, path.shape)
     turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 1.0))
-    assert ate_rmse_m((way + noise) @ turn.T + 5.0, way) == pytest.approx(0.2 * 3**0.5, rel=0.02)
-    assert ate_rmse_m(way + 7.0, way) == pytest.approx(0.0, abs=1e-9)
+    assert ate_rmse_m((path + noise) @ turn.T + 5.0, path) == pytest.approx(0.2 * 3**0.5, rel=0.02)
+    assert ate_rmse_m(path + 7.0, path) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("late_s", [-7.3, 0.0, 12.4])
 def test_two_logs_of_one_flight_find_their_common_time(late_s: float) -> None:
-    time_s, way = way_of(60.0)
+    time_s, path = path_of(60.0)
     turn = rotations.matrix(rotations.from_rpy(0.0, 0.0, 2.0))
-    other_s, other = time_s[100:1000] + late_s, way[100:1000] @ turn.T + 30.0
-    found = time_shift(time_s, way, other_s, other)
+    other_s, other = time_s[100:1000] + late_s, path[100:1000] @ turn.T + 30.0
+    found = time_shift(time_s, path, other_s, other)
     assert found.seconds == pytest.approx(-late_s, abs=0.06)
     assert found.alike > 0.9
 

@@ -1,19 +1,19 @@
-"""Clients that watch a simulation, as bridges let them: a session with queues."""
+"""External subscribers of a simulation, as bridges have them: a session with queues."""
 
 from volery.graph.typestore import typestore
 
 
-class Watcher:
-    """Subscribes to topics from outside; keeps what comes."""
+class ExternalSubscriber:
+    """Subscribes to topics as an external client; queues the messages."""
 
     def __init__(self, simulation, *topics, depth=10_000):
         self.session = simulation.gateway.open("watcher")
         self._depth = depth
         self._boxes = {}
         for topic in topics:
-            self.watch(topic)
+            self.subscribe(topic)
 
-    def watch(self, topic):
+    def subscribe(self, topic):
         self._boxes[topic] = self.session.subscribe(topic, depth=self._depth, wake=lambda: None)
 
     def take(self, topic):

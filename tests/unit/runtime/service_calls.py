@@ -1,4 +1,4 @@
-"""Asking services of a simulation, as bridges do, with plain data for requests."""
+"""Calls of a simulation's services, as bridges make them, with plain data for requests."""
 
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type
@@ -26,8 +26,8 @@ def request_of(graph, service, **fields):
     return fill(zero_message(f"{graph.services()[service]}_Request"), fields)
 
 
-def ask(simulation, service, **fields):
-    """The response of a service that answers at once; it must survive the wire."""
+def call_service(simulation, service, **fields):
+    """The response of a service that responds at once; it must survive the wire."""
     response = simulation.graph.call(service, request_of(simulation.graph, service, **fields))
     name = f"{simulation.graph.services()[service]}_Response"
     assert response.__msgtype__ == name
@@ -35,13 +35,13 @@ def ask(simulation, service, **fields):
     return typestore().deserialize_cdr(data, name)
 
 
-def ask_later(simulation, service, **fields):
+def start_call(simulation, service, **fields):
     """A list that will hold the response."""
-    answers = []
-    reply = ServiceReply(answers.append, answers.append)
+    responses = []
+    reply = ServiceReply(responses.append, responses.append)
     request = request_of(simulation.graph, service, **fields)
     simulation.graph.call_async(service, request, reply)
-    return answers
+    return responses
 
 
 def code_of(response):

@@ -3,8 +3,8 @@
 import json
 
 import pytest
-from recorded_messages import Watcher
-from service_calls import ask
+from recorded_messages import ExternalSubscriber
+from service_calls import call_service
 
 MOTOR = {"kind": "motor", "uav": "uav1", "rotor": 1, "thrust_factor": 0.9}
 IMU = {"kind": "sensor", "uav": "uav1", "sensor": "imu", "effect": "stuck"}
@@ -61,14 +61,14 @@ def test_faults_alike_end_one_by_one_and_those_of_deleted_uavs_are_not_listed(si
 def test_clients_receive_the_list_and_end_a_fault_with_what_they_received(simulate, flat_data):
     flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 5.0]
     simulation = simulate(flat_data)
-    watcher = Watcher(simulation, "/volery/faults")
-    assert ask(simulation, "/volery/inject_fault", fault=json.dumps(MOTOR)).success
+    subscriber = ExternalSubscriber(simulation, "/volery/faults")
+    assert call_service(simulation, "/volery/inject_fault", fault=json.dumps(MOTOR)).success
     simulation.run(1.5)
-    (told,) = json.loads(watcher.last("/volery/faults").data)
-    assert told == {**MOTOR, "at_s": told["at_s"]}
-    assert ask(simulation, "/volery/end_fault", fault=json.dumps(told)).success
+    (published,) = json.loads(subscriber.last("/volery/faults").data)
+    assert published == {**MOTOR, "at_s": published["at_s"]}
+    assert call_service(simulation, "/volery/end_fault", fault=json.dumps(published)).success
     simulation.run(1.5)
-    assert json.loads(watcher.last("/volery/faults").data) == []
+    assert json.loads(subscriber.last("/volery/faults").data) == []
 
 
 GNSS = {"kind": "gnss_loss", "uav": "uav1"}

@@ -25,27 +25,27 @@ def weak(flat_data, tmp_path):
     return flat_data
 
 
-def heard_events(simulation):
-    heard = []
+def received_events(simulation):
+    events = []
     simulation.graph.subscribe(
-        "/events", lambda p: heard.append(json.loads(p.message.data)), String
+        "/events", lambda p: events.append(json.loads(p.message.data)), String
     )
-    return heard
+    return events
 
 
 def test_each_level_is_warned_of_on_terminal_and_topic(simulate, weak, caplog):
     simulation = simulate(weak)
-    heard = heard_events(simulation)
+    events = received_events(simulation)
     with caplog.at_level(logging.WARNING):
         simulation.run_until("impact", timeout_s=60.0)
-    levels = [event["detail"] for event in heard if event["kind"] == "battery"]
+    levels = [event["detail"] for event in events if event["kind"] == "battery"]
     assert levels == ["battery low", "battery critical", "battery emergency", "battery empty"]
-    said = [record.getMessage() for record in caplog.records]
-    assert len(said) == 4
-    for text, level in zip(said, levels, strict=True):
+    warnings = [record.getMessage() for record in caplog.records]
+    assert len(warnings) == 4
+    for text, level in zip(warnings, levels, strict=True):
         assert f"uav1: {level}, " in text
-    assert "15 % left" in said[0]
-    assert said[3].endswith("its rotors stop")
+    assert "15 % left" in warnings[0]
+    assert warnings[3].endswith("its rotors stop")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What is told of clients' commands on `/volery/log`, and what is kept for later logs."""
+"""What `/volery/log` publishes of clients' commands, and what later logs begin with."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ def flying(simulate, flat_data):
 
 
 @pytest.fixture
-def heard(flying):
+def records(flying):
     found = []
     flying.graph.subscribe(TOPIC, lambda published: found.append(published.message), TYPE)
     return found
 
 
-def ask(simulation, service, srvtype, **fields):
+def call_service(simulation, service, srvtype, **fields):
     request = zero_message(f"{srvtype}_Request")
     for name, value in fields.items():
         setattr(request, name, value)
-    answers = []
+    responses = []
     simulation.gateway.open("page").call(
-        service, request, ServiceReply(answers.append, answers.append)
+        service, request, ServiceReply(responses.append, responses.append)
     )
     simulation.process_commands()
-    return answers[0]
+    return responses[0]
 
 
-def test_a_command_is_told_as_it_is_taken(flying, heard):
+def test_a_command_is_logged_as_it_is_applied(flying, records):
     flying.run(0.123)
     session = flying.gateway.open("pilot 7")
     session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
@@ -58,7 +58,7 @@ def test_a_command_is_told_as_it_is_taken(flying, heard):
     flying.process_commands()
     session.publish("/uav1/cmd_vel", TWIST)
     flying.process_commands()
-    advertised, first, second = heard
+    advertised, first, second = records
     assert (advertised.kind, advertised.latched, advertised.content) == ("advertise", False, "")
     assert (first.client, first.kind, first.name) == ("pilot 7", "publish", "/uav1/cmd_vel")
     assert first.type == "geometry_msgs/msg/Twist"
@@ -70,21 +70,23 @@ def test_a_command_is_told_as_it_is_taken(flying, heard):
     assert (again.linear.x, again.angular.z) == (0.1, 1e-300)
 
 
-def test_questions_are_not_logged_and_refused_commands_are(flying, heard):
-    ask(flying, "/get_entities", f"{STANDARD}/GetEntities")
-    ask(flying, "/volery/list_snapshots", f"{OURS}/ListSnapshots")
-    assert not heard
-    assert not ask(flying, "/volery/inject_fault", f"{OURS}/InjectFault", fault="x").success
-    assert [(r.kind, r.name, json.loads(r.content)) for r in heard] == [
+def test_questions_are_not_logged_and_refused_commands_are(flying, records):
+    call_service(flying, "/get_entities", f"{STANDARD}/GetEntities")
+    call_service(flying, "/volery/list_snapshots", f"{OURS}/ListSnapshots")
+    assert not records
+    assert not call_service(
+        flying, "/volery/inject_fault", f"{OURS}/InjectFault", fault="x"
+    ).success
+    assert [(r.kind, r.name, json.loads(r.content)) for r in records] == [
         ("call", "/volery/inject_fault", {"fault": "x"})
     ]
 
 
-def test_what_only_paces_is_no_turn(flying, heard):
-    ask(flying, "/volery/set_speed", f"{OURS}/SetSpeed", factor=2.0)
-    ask(flying, "/uav1/land", "std_srvs/srv/Trigger")
-    ask(flying, "/uav1/land", "std_srvs/srv/Trigger")
-    assert [record.turn for record in heard] == [0, 0, 1]
+def test_what_only_paces_is_no_turn(flying, records):
+    call_service(flying, "/volery/set_speed", f"{OURS}/SetSpeed", factor=2.0)
+    call_service(flying, "/uav1/land", "std_srvs/srv/Trigger")
+    call_service(flying, "/uav1/land", "std_srvs/srv/Trigger")
+    assert [record.turn for record in records] == [0, 0, 1]
 
 
 @pytest.mark.parametrize(
@@ -106,13 +108,13 @@ def test_how_much_hangs_on_a_command(kind, srvtype, weight):
     assert weight_of(ClientCommand("x", kind, "/x", srvtype)) is weight
 
 
-def test_the_record_of_going_back_is_not_taken_back(flying, heard):
-    ask(flying, "/volery/save_snapshot", f"{OURS}/ByName", name="a")
+def test_the_record_of_going_back_is_not_taken_back(flying, records):
+    call_service(flying, "/volery/save_snapshot", f"{OURS}/ByName", name="a")
     flying.run(0.1)
-    assert ask(flying, "/volery/restore_snapshot", f"{OURS}/ByName", name="a").success
-    ask(flying, "/reset_simulation", f"{STANDARD}/ResetSimulation")
+    assert call_service(flying, "/volery/restore_snapshot", f"{OURS}/ByName", name="a").success
+    call_service(flying, "/reset_simulation", f"{STANDARD}/ResetSimulation")
     flying.run(0.1)
-    names = [record.name for record in heard]
+    names = [record.name for record in records]
     assert names == ["/volery/save_snapshot", "/volery/restore_snapshot", "/reset_simulation"]
 
 
@@ -167,7 +169,7 @@ def test_texts_and_lists_are_shortened_for_people():
 
 
 def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
-    monkeypatch.setattr(command_log, "MOST_KEPT_BYTES", 10_000)
+    monkeypatch.setattr(command_log, "MAX_STORED_BYTES", 10_000)
     session = flying.gateway.open("operator")
     session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     for _ in range(100):
@@ -187,13 +189,13 @@ def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
 
 
 def test_what_is_kept_beyond_its_bound_holds_no_content(flying, monkeypatch):
-    monkeypatch.setattr(command_log, "MOST_KEPT_BYTES", 10_000)
+    monkeypatch.setattr(command_log, "MAX_STORED_BYTES", 10_000)
     session = flying.gateway.open("camera")
     session.advertise("/picture", "sensor_msgs/msg/CompressedImage")
     for _ in range(3):
-        picture = zero_message("sensor_msgs/msg/CompressedImage")
-        picture.data = np.zeros(6_000, np.uint8)
-        session.publish("/picture", picture)
+        image = zero_message("sensor_msgs/msg/CompressedImage")
+        image.data = np.zeros(6_000, np.uint8)
+        session.publish("/picture", image)
     flying.process_commands()
     (only,) = flying.commands.earlier()
     assert (only.message.number, len(only.message.cdr), only.message.follows) == (3, 0, False)
@@ -208,6 +210,6 @@ def test_a_scenario_comes_back_from_its_log(name):
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"name": "x"}', "null"])
-def test_what_tells_of_no_scenario(text):
+def test_what_holds_no_scenario(text):
     with pytest.raises(RecordingError, match="no scenario"):
         RecordedScenario.from_json(text)

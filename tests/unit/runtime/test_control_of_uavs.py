@@ -1,4 +1,4 @@
-"""Who holds a UAV: one operator at a time."""
+"""Control authority over a UAV: one operator at a time."""
 
 import pytest
 
@@ -12,15 +12,15 @@ def operators():
 
 
 def test_taking_releasing_and_handing_over(operators):
-    assert operators.holder_of("uav1") == ""
+    assert operators.operator_of("uav1") == ""
     operators.take("uav1", "Anna")
     operators.take("uav1", "Anna")
-    assert operators.holder_of("uav1") == "Anna"
-    assert operators.holder_of("uav2") == ""
+    assert operators.operator_of("uav1") == "Anna"
+    assert operators.operator_of("uav2") == ""
     operators.hand_over("uav1", "Anna", "Ben")
-    assert operators.holder_of("uav1") == "Ben"
+    assert operators.operator_of("uav1") == "Ben"
     operators.release("uav1", "Ben")
-    assert operators.holder_of("uav1") == ""
+    assert operators.operator_of("uav1") == ""
 
 
 def test_what_another_holds_stays_his(operators):
@@ -34,10 +34,10 @@ def test_what_another_holds_stays_his(operators):
             attempt()
     with pytest.raises(CommandError, match="does not hold uav2"):
         operators.release("uav2", "Ben")
-    assert operators.holder_of("uav1") == "Anna"
+    assert operators.operator_of("uav1") == "Anna"
 
 
-def test_who_leaves_lets_go_of_everything(operators):
+def test_a_client_that_leaves_releases_everything(operators):
     operators.take("uav1", "Anna")
     operators.take("uav2", "Anna")
     assert operators.held_by("Anna") == ("uav1", "uav2")
@@ -45,7 +45,7 @@ def test_who_leaves_lets_go_of_everything(operators):
     assert operators.held_by("Anna") == ()
     operators.take("uav2", "Ben")
     operators.release("", "Anna")
-    assert operators.holder_of("uav2") == "Ben"
+    assert operators.operator_of("uav2") == "Ben"
 
 
 @pytest.mark.parametrize("name", ["", "  ", "x" * 41, "\u200b\n"])

@@ -1,9 +1,9 @@
-"""A scenario that ends while clients are connected: it waits, says so, and continues if asked."""
+"""A scenario that ends while clients are connected: it waits, says so, and continues on request."""
 
 from contextlib import suppress
 
 import pytest
-from service_calls import ask, code_of, request_of
+from service_calls import call_service, code_of, request_of
 
 from volery.core.errors import GraphError
 from volery.graph.service_reply import ServiceReply
@@ -27,13 +27,13 @@ class Client:
         self.session = simulation.gateway.open("test")
 
     def at_end(self, *calls):
-        """Answers to calls that are made while the simulation waits; then the wait ends."""
-        answers = []
+        """Responses to calls that are made while the simulation waits; then the wait ends."""
+        responses = []
 
         def look():
-            if len(answers) < len(calls):
-                service, fields = calls[len(answers)]
-                reply = ServiceReply(answers.append, answers.append)
+            if len(responses) < len(calls):
+                service, fields = calls[len(responses)]
+                reply = ServiceReply(responses.append, responses.append)
                 request = request_of(self.simulation.graph, service, **fields)
                 self.session.call(service, request, reply)
                 self.simulation.process_commands()
@@ -42,8 +42,8 @@ class Client:
 
         with suppress(EndedError):
             self.simulation.wait_at_end(look)
-        assert len(answers) == len(calls)
-        return answers
+        assert len(responses) == len(calls)
+        return responses
 
 
 @pytest.fixture
@@ -56,9 +56,9 @@ def ended(simulate, flat_data):
 
 @pytest.mark.parametrize(("service", "fields"), STANDARD_REFUSALS)
 def test_services_of_the_standard_refuse_with_a_reason(ended, service, fields):
-    (answer,) = Client(ended).at_end((service, fields))
-    assert code_of(answer) != 1
-    assert "the scenario ended at 0.1 s" in answer.result.error_message
+    (response,) = Client(ended).at_end((service, fields))
+    assert code_of(response) != 1
+    assert "the scenario ended at 0.1 s" in response.result.error_message
     assert ended.time_ns == 50_000_000
 
 
@@ -72,9 +72,9 @@ def test_services_of_the_standard_refuse_with_a_reason(ended, service, fields):
     ],
 )
 def test_commands_without_effect_are_refused(ended, service, fields):
-    (answer,) = Client(ended).at_end((service, fields))
-    assert isinstance(answer, GraphError)
-    assert "/volery/continue_run" in str(answer)
+    (response,) = Client(ended).at_end((service, fields))
+    assert isinstance(response, GraphError)
+    assert "/volery/continue_run" in str(response)
 
 
 def test_what_only_asks_is_answered(ended):
@@ -98,13 +98,13 @@ def test_the_status_says_so(ended):
 
 def test_it_flies_on_where_asked(ended):
     client = Client(ended)
-    (answer,) = client.at_end(("/volery/continue_run", {}))
-    assert answer.success
+    (response,) = client.at_end(("/volery/continue_run", {}))
+    assert response.success
     assert not ended.clock.paused
     ended.run(0.02)
     assert not ended.clock.finished
     assert ended.time_ns == 70_000_000
-    assert ask(ended, "/uav1/take_off").success
+    assert call_service(ended, "/uav1/take_off").success
 
 
 def test_a_run_to_the_end_past_the_end_lasts_until_somebody_quits(ended):
@@ -128,13 +128,13 @@ def test_a_reset_brings_the_end_back(ended):
 
 
 def test_a_reset_ends_the_wait(ended):
-    (answer,) = Client(ended).at_end(("/reset_simulation", {"scope": 255}))
-    assert code_of(answer) == 1
+    (response,) = Client(ended).at_end(("/reset_simulation", {"scope": 255}))
+    assert code_of(response) == 1
     assert not ended.clock.finished
     assert not ended.waits_at_end
 
 
 def test_only_an_ended_run_is_continued(simulate, flat_data):
-    answer = ask(simulate(flat_data), "/volery/continue_run")
-    assert not answer.success
-    assert "has not ended" in answer.message
+    response = call_service(simulate(flat_data), "/volery/continue_run")
+    assert not response.success
+    assert "has not ended" in response.message

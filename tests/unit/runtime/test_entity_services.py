@@ -1,8 +1,8 @@
-"""Entities by the standard: who is there, where, and putting them elsewhere."""
+"""Entities by the standard: which exist, their poses, and moving them."""
 
 import numpy as np
 import pytest
-from service_calls import ask, code_of
+from service_calls import call_service, code_of
 
 OK, UNSUPPORTED, NOT_FOUND, FAILED, INVALID_POSE = 1, 0, 2, 4, 101
 NAME_NOT_UNIQUE, NAME_INVALID, UNSUPPORTED_FORMAT, NO_RESOURCE = 101, 102, 103, 104
@@ -22,7 +22,7 @@ def trio(simulate, flat_data):
 
 
 def names(simulation, **filters):
-    response = ask(simulation, "/get_entities", filters=filters)
+    response = call_service(simulation, "/get_entities", filters=filters)
     assert code_of(response) == OK, response.result.error_message
     return list(response.entities)
 
@@ -30,7 +30,7 @@ def names(simulation, **filters):
 def put(simulation, name, position, **changes):
     state = {"pose": {"position": dict(zip("xyz", position, strict=True)), "orientation": UPRIGHT}}
     fields = {"set_pose": True, **changes}
-    return ask(simulation, "/set_entity_state", entity=name, state=state, **fields)
+    return call_service(simulation, "/set_entity_state", entity=name, state=state, **fields)
 
 
 def test_all_are_listed_in_order(trio):
@@ -80,28 +80,28 @@ def test_bounds_choose_what_reaches_into_them(trio):
 )
 def test_bad_filters_are_refused_with_a_reason(trio, filters, code):
     for service in ("/get_entities", "/get_entities_states"):
-        response = ask(trio, service, filters=filters)
+        response = call_service(trio, service, filters=filters)
         assert code_of(response) == code
         assert response.result.error_message
 
 
 def test_states_are_true_ones_in_the_map(trio):
     trio.run(0.2)
-    response = ask(trio, "/get_entity_state", entity="uav3")
+    response = call_service(trio, "/get_entity_state", entity="uav3")
     position = response.state.pose.position
     assert [position.x, position.y, position.z] == trio.uavs["uav3"].position_map.tolist()
     assert response.state.header.frame_id == "map"
     assert response.state.header.stamp.nanosec == 200_000_000
-    every = ask(trio, "/get_entities_states", filters={"filter": "uav[23]"})
+    every = call_service(trio, "/get_entities_states", filters={"filter": "uav[23]"})
     assert list(every.entities) == ["uav2", "uav3"]
     assert every.states[1].pose.position.x == position.x
 
 
 def test_info_and_bounds(trio):
-    info = ask(trio, "/get_entity_info", entity="uav3").info
+    info = call_service(trio, "/get_entity_info", entity="uav3").info
     assert info.category.category == 1
     assert "scout" in info.tags
-    bounds = ask(trio, "/get_entity_bounds", entity="uav3").bounds
+    bounds = call_service(trio, "/get_entity_bounds", entity="uav3").bounds
     assert bounds.type == 1
     upper, lower = bounds.points
     assert upper.x > 0.1 > -0.1 > lower.x
@@ -110,7 +110,7 @@ def test_info_and_bounds(trio):
 
 @pytest.mark.parametrize("service", ["state", "info", "bounds"])
 def test_unknown_entities(trio, service):
-    response = ask(trio, f"/get_entity_{service}", entity="nobody")
+    response = call_service(trio, f"/get_entity_{service}", entity="nobody")
     assert code_of(response) == NOT_FOUND
     assert "nobody" in response.result.error_message
 
@@ -142,7 +142,7 @@ def test_a_uav_that_flies_holds_where_it_was_put(trio):
 
 def test_twist_alone_and_both(trio):
     fields = {"state": {"twist": {"linear": {"x": 2.0}}}, "set_twist": True}
-    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == OK
+    assert code_of(call_service(trio, "/set_entity_state", entity="uav3", **fields)) == OK
     np.testing.assert_allclose(trio.uavs["uav3"].velocity_map, [2.0, 0.0, 0.0])
     trio.run(4.0)
     assert trio.uavs["uav3"].position_map[0] > 40.2
@@ -158,7 +158,7 @@ def test_twist_alone_and_both(trio):
         ((float("nan"), 0.0, 10.0), "finite"),
     ],
 )
-def test_places_that_are_none(trio, position, reason):
+def test_invalid_positions(trio, position, reason):
     before = trio.uavs["uav1"].position_map
     response = put(trio, "uav1", position)
     assert code_of(response) == INVALID_POSE
@@ -166,7 +166,7 @@ def test_places_that_are_none(trio, position, reason):
     np.testing.assert_array_equal(trio.uavs["uav1"].position_map, before)
 
 
-def test_no_place_inside_a_tree(simulate, wood_data):
+def test_no_position_inside_a_tree(simulate, wood_data):
     simulation = simulate(wood_data)
     x, y, _z = simulation.world.forest.position_map[7]
     height = float(simulation.world.terrain.height(x, y)) + 0.5
@@ -180,11 +180,11 @@ def test_states_that_cannot_be_set(trio):
     assert code_of(put(trio, "uav3", (0.0, 0.0, 5.0), set_pose=False)) == FAILED
     assert code_of(put(trio, "uav3", (0.0, 0.0, 5.0), set_acceleration=True)) == UNSUPPORTED
     fields = {"state": {"header": {"frame_id": "odom"}}, "set_pose": True}
-    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
+    assert code_of(call_service(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
     fields = {"state": {"twist": {"linear": {"x": float("inf")}}}, "set_twist": True}
-    assert code_of(ask(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
+    assert code_of(call_service(trio, "/set_entity_state", entity="uav3", **fields)) == FAILED
     crooked = {"pose": {"position": {"x": 0.0, "y": 9.0, "z": 5.0}, "orientation": {"w": 0.0}}}
-    response = ask(trio, "/set_entity_state", entity="uav3", state=crooked, set_pose=True)
+    response = call_service(trio, "/set_entity_state", entity="uav3", state=crooked, set_pose=True)
     assert code_of(response) == INVALID_POSE
 
 
@@ -200,9 +200,9 @@ def test_a_set_state_is_the_same_again(simulate, flat_data):
     assert digest() == digest()
 
 
-def spawn(simulation, uri="scout", place=(60.0, 0.0, 0.0), **fields):
-    pose = {"pose": {"position": dict(zip("xyz", place, strict=True))}}
-    return ask(
+def spawn(simulation, uri="scout", position=(60.0, 0.0, 0.0), **fields):
+    pose = {"pose": {"position": dict(zip("xyz", position, strict=True))}}
+    return call_service(
         simulation,
         "/spawn_entity",
         **{"entity_resource": {"uri": uri}, "initial_pose": pose, **fields},
@@ -210,7 +210,7 @@ def spawn(simulation, uri="scout", place=(60.0, 0.0, 0.0), **fields):
 
 
 def test_types_and_airframes_can_be_spawned(trio):
-    uris = [s.entity_resource.uri for s in ask(trio, "/get_spawnables").spawnables]
+    uris = [s.entity_resource.uri for s in call_service(trio, "/get_spawnables").spawnables]
     assert uris[:2] == ["f450", "scout"]
     assert "crazyflie" in uris
     assert len(set(uris)) == len(uris)
@@ -219,9 +219,9 @@ def test_types_and_airframes_can_be_spawned(trio):
         assert code_of(response) == OK, response.result.error_message
         assert response.entity_name == f"new{number}"
     assert names(trio)[3:] == [f"new{number}" for number in range(len(uris))]
-    info = ask(trio, "/get_entity_info", entity="new2").info
+    info = call_service(trio, "/get_entity_info", entity="new2").info
     assert uris[2] in info.description
-    assert ask(trio, "/new0/take_off_to", altitude=2.0).success
+    assert call_service(trio, "/new0/take_off_to", altitude=2.0).success
     trio.run(3.0)
     assert trio.uavs["new0"].position_map[2] > 1.5
 
@@ -229,7 +229,7 @@ def test_types_and_airframes_can_be_spawned(trio):
 def test_names_are_found_where_that_is_allowed(trio):
     assert spawn(trio, name="uav2", allow_renaming=True).entity_name == "uav2_1"
     there = (80.0, 0.0, 0.0)
-    assert spawn(trio, place=there, allow_renaming=True).entity_name == "uav4"
+    assert spawn(trio, position=there, allow_renaming=True).entity_name == "uav4"
     assert code_of(spawn(trio, name="uav2")) == NAME_NOT_UNIQUE
     assert code_of(spawn(trio)) == NAME_INVALID
     assert code_of(spawn(trio, name="No")) == NAME_INVALID
@@ -242,13 +242,13 @@ def test_names_are_found_where_that_is_allowed(trio):
         ({"uri": ""}, NO_RESOURCE),
         ({"uri": "zeppelin"}, NOT_FOUND),
         ({"entity_namespace": "/elsewhere"}, NAMESPACE_INVALID),
-        ({"place": (0.0, 0.0, 0.2)}, SPAWN_POSE_INVALID),
-        ({"place": (60.0, 0.0, -5.0)}, SPAWN_POSE_INVALID),
-        ({"place": (60.0, 0.0, float("nan"))}, SPAWN_POSE_INVALID),
+        ({"position": (0.0, 0.0, 0.2)}, SPAWN_POSE_INVALID),
+        ({"position": (60.0, 0.0, -5.0)}, SPAWN_POSE_INVALID),
+        ({"position": (60.0, 0.0, float("nan"))}, SPAWN_POSE_INVALID),
         ({"initial_pose": {"header": {"frame_id": "odom"}}}, SPAWN_POSE_INVALID),
     ],
 )
-def test_what_cannot_be_spawned_is_told(trio, fields, code):
+def test_what_cannot_be_spawned_is_reported(trio, fields, code):
     response = spawn(trio, name="extra", **fields)
     assert code_of(response) == code
     assert response.result.error_message
@@ -265,40 +265,40 @@ def test_several_are_spawned_one_by_one(trio):
         }
         for name, x in (("a", 60.0), ("b", 0.0), ("c", 70.0))
     ]
-    response = ask(trio, "/spawn_entities", spawn_requests=requests)
+    response = call_service(trio, "/spawn_entities", spawn_requests=requests)
     assert code_of(response) == SPAWN_FAILED
     assert "1 of 3" in response.result.error_message
     assert [one.result.result for one in response.results] == [OK, SPAWN_POSE_INVALID, OK]
     assert [one.entity_name for one in response.results] == ["a", "", "c"]
-    assert code_of(ask(trio, "/spawn_entities", spawn_requests=[])) == OK
+    assert code_of(call_service(trio, "/spawn_entities", spawn_requests=[])) == OK
 
 
 def test_deleting(trio):
-    assert code_of(ask(trio, "/delete_entity", entity="nobody")) == NOT_FOUND
-    assert code_of(ask(trio, "/delete_entity", entity="uav1")) == OK
+    assert code_of(call_service(trio, "/delete_entity", entity="nobody")) == NOT_FOUND
+    assert code_of(call_service(trio, "/delete_entity", entity="uav1")) == OK
     assert names(trio) == ["uav2", "uav3"]
-    assert code_of(ask(trio, "/delete_entity", entity="uav3")) == OK
-    response = ask(trio, "/delete_entity", entity="uav2")
+    assert code_of(call_service(trio, "/delete_entity", entity="uav3")) == OK
+    response = call_service(trio, "/delete_entity", entity="uav2")
     assert code_of(response) == FAILED
     assert "at least one" in response.result.error_message
 
 
 def test_starts_are_named_poses(trio):
-    poses = ask(trio, "/get_named_poses").poses
+    poses = call_service(trio, "/get_named_poses").poses
     assert [pose.name for pose in poses] == ["uav1_start", "uav2_start", "uav3_start"]
     assert poses[2].pose.position.z == 5.0
-    chosen = ask(trio, "/get_named_poses", tags={"tags": ["scout"]}).poses
+    chosen = call_service(trio, "/get_named_poses", tags={"tags": ["scout"]}).poses
     assert [pose.name for pose in chosen] == ["uav3_start"]
-    bounds = ask(trio, "/get_named_pose_bounds", name="uav2_start").bounds
+    bounds = call_service(trio, "/get_named_pose_bounds", name="uav2_start").bounds
     assert bounds.type == 3
     assert bounds.points[0].x == 20.0
     assert bounds.points[1].x > 0.1
-    assert code_of(ask(trio, "/get_named_pose_bounds", name="nowhere")) == NOT_FOUND
+    assert code_of(call_service(trio, "/get_named_pose_bounds", name="nowhere")) == NOT_FOUND
 
 
 @pytest.mark.parametrize("plant", ["rigid_body", "kinematic", "identified"])
 def test_other_plants_and_estimates_move_along(simulate, flat_data, plant):
-    """A UAV that flies on an estimate believes in its new place at once, and stays there."""
+    """A UAV that flies on an estimate estimates its new position at once, and stays there."""
     kind = flat_data["types"]["f450"]
     kind["plant"] = plant
     kind["sensors"] = [{"kind": "imu"}, {"kind": "gnss"}, {"kind": "estimate"}]

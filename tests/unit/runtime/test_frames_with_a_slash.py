@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from service_calls import ask, code_of
+from service_calls import call_service, code_of
 
 from volery.graph.codecs.zero import zero_message
 from volery.runtime import Simulation
@@ -47,15 +47,15 @@ def pose(x, z=3.0):
 
 
 def send(simulation, topic, message):
-    """Publishes as a client; returns what it is told."""
-    told = []
+    """Publishes as a client; returns the errors that it receives."""
+    errors = []
     session = simulation.gateway.open("client")
-    session.on_refused = told.append
+    session.on_refused = errors.append
     session.advertise(topic, message.__msgtype__)
     session.publish(topic, message)
     simulation.run(0.1)
     session.close()
-    return told
+    return errors
 
 
 def test_goals_and_trajectories(simulation):
@@ -74,7 +74,7 @@ def test_poses_of_a_kinematic_uav_and_of_an_actor(simulation):
     assert send(simulation, "/uav2/pose_command", pose(12.0)) == []
     assert simulation.uavs["uav2"].position_map[0] == pytest.approx(12.0)
     assert send(simulation, "/actors/walker/pose", pose(31.0, 0.0)) == []
-    state = ask(simulation, "/get_entity_state", entity="walker").state
+    state = call_service(simulation, "/get_entity_state", entity="walker").state
     assert state.pose.position.x == pytest.approx(31.0)
 
 
@@ -83,15 +83,17 @@ def test_states_and_spawning(simulation):
         "header": HEADER,
         "pose": {"position": {"x": 5.0, "z": 3.0}, "orientation": {"w": 1.0}},
     }
-    response = ask(simulation, "/set_entity_state", entity="uav1", state=state, set_pose=True)
+    response = call_service(
+        simulation, "/set_entity_state", entity="uav1", state=state, set_pose=True
+    )
     assert code_of(response) == OK, response.result.error_message
-    place = {"header": HEADER, "pose": {"position": {"x": 50.0}}}
-    response = ask(
+    initial_pose = {"header": HEADER, "pose": {"position": {"x": 50.0}}}
+    response = call_service(
         simulation,
         "/spawn_entity",
         name="more",
         entity_resource={"uri": "f450"},
-        initial_pose=place,
+        initial_pose=initial_pose,
     )
     assert code_of(response) == OK, response.result.error_message
 

@@ -33,14 +33,14 @@ def solid(shift=0.0, **changes):
     return replace(Solid(mesh, Material.WALL, "wall"), **changes)
 
 
-def test_the_same_things_have_the_same_name():
+def test_equal_worlds_have_the_same_name():
     made = [Geometry(terrain(), forest(), (solid(),)).id for _ in range(2)]
     assert made[0] == made[1]
     assert len(made[0]) == 24
     int(made[0], 16)
 
 
-def test_other_things_have_other_names():
+def test_different_worlds_have_different_names():
     names = [
         Geometry(terrain()).id,
         Geometry(terrain(1.0)).id,
@@ -68,23 +68,23 @@ def test_kinds_of_worlds(name, kind):
     assert kind_of(load_scenario(name)) == kind
 
 
-def test_the_name_is_told_when_blocks_change_and_after_a_restore():
+def test_the_name_is_published_when_blocks_change_and_after_a_restore():
     scenario = overrides.apply(load_scenario("grid_map"), uavs=None, seconds=5.0, seed=None)
-    told = []
+    ids = []
     with Simulation(scenario, threads=1) as simulation:
-        simulation.graph.subscribe("/volery/world", lambda p: told.append(p.message.data))
+        simulation.graph.subscribe("/volery/world", lambda p: ids.append(p.message.data))
         simulation.step(2)
         first = simulation.geometry
-        assert told == [first.id]
+        assert ids == [first.id]
         kept = simulation.snapshot()
         simulation.world.grid_map.change(block_height_m=9.0)
         simulation.step(2)
         assert simulation.geometry.id != first.id
-        assert told == [first.id, simulation.geometry.id]
+        assert ids == [first.id, simulation.geometry.id]
         simulation.world.grid_map.change(block_height_m=9.0)  # nothing else stands there
         simulation.step(2)
-        assert len(told) == 2
+        assert len(ids) == 2
         simulation.restore(kept)
         simulation.step(2)
         assert simulation.geometry.id == first.id
-        assert told[-1] == first.id
+        assert ids[-1] == first.id

@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 import pytest
-from service_calls import ask, request_of
+from service_calls import call_service, request_of
 
 from volery.core.errors import CommandError, DataFileError, PlacementError, ScenarioError
 from volery.engine.events import EventKind
@@ -86,9 +86,9 @@ def test_the_next_scan_sees_the_change(simulate, blocks_data):
         simulation.run(0.025)  # one scan
         assert len(ahead.ranges) == seen + 1
         assert ahead.ranges[-1] == pytest.approx(want, abs=1e-3), change
-    told = [event for event in simulation.diagnostics.events if event.kind is EventKind.WORLD]
-    assert len(told) == 6
-    assert "'far', 5 x 7 cells of 2 m, blocks 2.5 m high" in told[-1].describe()
+    events = [event for event in simulation.diagnostics.events if event.kind is EventKind.WORLD]
+    assert len(events) == 6
+    assert "'far', 5 x 7 cells of 2 m, blocks 2.5 m high" in events[-1].describe()
 
 
 def test_runs_with_changes_are_the_same_twice_and_from_slices(simulate, blocks_data):
@@ -144,7 +144,9 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     assert ahead.ranges[-1] == pytest.approx(7.0, abs=1e-3)
 
 
-def test_a_matrix_stands_as_it_is_read_and_told_as_the_message_wants(simulate, tmp_path, flat_data):
+def test_a_matrix_stands_as_it_is_read_and_is_published_as_the_message_wants(
+    simulate, tmp_path, flat_data
+):
     """The first line is the top, at the highest y; a message begins with the lowest."""
     (tmp_path / "l.csv").write_text("1,0\n1,0\n1,1\n")  # an L
     world = {"grid_map": {"maps": [{"file": str(tmp_path / "l.csv")}], "origin_m": [5.0, 5.0]}}
@@ -193,31 +195,36 @@ def test_maps_that_are_none_are_refused_in_an_event(simulate, blocks_data):
     for message in wrong:
         sender.publish(message)
     simulation.step(1)
-    told = [event.detail for event in simulation.diagnostics.events]
-    assert len(told) == len(wrong)
-    assert all(text.startswith("a grid map was refused: ") for text in told)
+    details = [event.detail for event in simulation.diagnostics.events]
+    assert len(details) == len(wrong)
+    assert all(text.startswith("a grid map was refused: ") for text in details)
     words = ("as many entries", "cell_size_m", "finite", "about z", "0 x 1 cells", "beyond the")
-    assert all(word in text for word, text in zip(words, told, strict=True)), told
+    assert all(word in text for word, text in zip(words, details, strict=True)), details
     assert simulation.world.grid_map.current is before
 
 
-def test_services_change_and_tell(simulate, blocks_data):
+def test_services_change_and_return_the_map(simulate, blocks_data):
     simulation = simulate(blocks_data)
-    told = ask(simulation, "/volery/get_grid_map")
-    assert (told.name, told.names, told.rows, told.columns) == ("near", ["near", "far"], 7, 3)
-    assert ask(simulation, "/volery/set_grid_map", name="far", block_height=2.0).success
-    told = ask(simulation, "/volery/get_grid_map")
-    assert (told.name, told.block_height, told.cell_size) == ("far", 2.0, 3.0)
+    response = call_service(simulation, "/volery/get_grid_map")
+    assert (response.name, response.names, response.rows, response.columns) == (
+        "near",
+        ["near", "far"],
+        7,
+        3,
+    )
+    assert call_service(simulation, "/volery/set_grid_map", name="far", block_height=2.0).success
+    response = call_service(simulation, "/volery/get_grid_map")
+    assert (response.name, response.block_height, response.cell_size) == ("far", 2.0, 3.0)
     for wrong, word in (
         ({"name": "none"}, "known: near, far"),
         ({"block_height": -1.0}, "block_height_m"),
         ({"cell_size": float("nan")}, "cell_size_m"),
         ({"cell_size": 900.0}, "beyond the terrain"),
     ):
-        answer = ask(simulation, "/volery/set_grid_map", **wrong)
-        assert not answer.success
-        assert word in answer.message
-    assert ask(simulation, "/volery/get_grid_map").name == "far"
+        refused = call_service(simulation, "/volery/set_grid_map", **wrong)
+        assert not refused.success
+        assert word in refused.message
+    assert call_service(simulation, "/volery/get_grid_map").name == "far"
 
 
 def test_resets_and_snapshots_take_the_map_along(simulate, blocks_data):
@@ -246,7 +253,7 @@ def test_resets_and_snapshots_take_the_map_along(simulate, blocks_data):
     assert simulation.world.grid_map.current.block_height_m == TALL_M
 
 
-def test_who_is_in_a_new_block_touches_it_with_the_next_step(simulate, blocks_data):
+def test_a_uav_inside_a_new_block_touches_it_with_the_next_step(simulate, blocks_data):
     simulation = simulate(blocks_data)
     simulation.run(0.1)
     assert not simulation.diagnostics.events

@@ -55,10 +55,10 @@ class Visitor:
         request = zero_message(f"{srvtype}_Request")
         for name, value in fields.items():
             setattr(request, name, value)
-        answers = []
-        self.session.call(service, request, ServiceReply(answers.append, answers.append))
+        responses = []
+        self.session.call(service, request, ServiceReply(responses.append, responses.append))
         self.player.wait(0.0)
-        return answers[0]
+        return responses[0]
 
     def ours(self, service, kind, **fields):
         return self.call(f"/volery/{service}", f"volery_interfaces/srv/{kind}", **fields)
@@ -70,7 +70,7 @@ class Visitor:
         return self.call("/set_simulation_state", service, state=message).result.result
 
 
-def told(messages):
+def rows_of(messages):
     return [(p.topic, p.msgtype, p.time_ns, p.cdr) for p in messages if p.topic != "/clock"]
 
 
@@ -82,12 +82,12 @@ def play_out(player):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_what_is_played_is_what_was_recorded(flights, suffix):
     """Every topic, time and byte, in the order of the log."""
-    heard = []
+    received = []
     with LogPlayer(flights[suffix], speed=None) as player:
-        player.graph.subscribe_all(heard.append)
+        player.graph.subscribe_all(received.append)
         play_out(player)
         assert player.paused
-    heard = [p for p in heard if not p.topic.startswith("/volery/player")]
+    received = [p for p in received if not p.topic.startswith("/volery/player")]
     decoder = LogDecoder()
     expected = [
         (r.topic.topic, decoder.decode(r).msgtype, r.time_ns, m.Published("", *decoded).cdr)
@@ -96,7 +96,7 @@ def test_what_is_played_is_what_was_recorded(flights, suffix):
         for decoded in [(decoder.decode(r).msgtype, 0, decoder.decode(r).message)]
     ]
     assert len(expected) > 1000
-    assert told(heard) == expected
+    assert rows_of(received) == expected
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -122,24 +122,24 @@ def test_anywhere_what_was_the_case_is_shown(flights, suffix):
             assert player.time_s == second
         late = visitor.listen("/uav1/imu")
         player.wait(0.0)
-        assert len(late.take()) == 1  # who begins to listen is shown what was the case, too
+        assert len(late.take()) == 1  # a late subscriber receives the last message, too
 
 
 def test_what_follows_a_leap_is_the_rest_of_the_log(flight):
-    heard = []
+    received = []
     with LogPlayer(flight, speed=None) as player:
-        player.graph.subscribe("/uav1/odom", heard.append, m.Odometry)
+        player.graph.subscribe("/uav1/odom", received.append, m.Odometry)
         player.wait(0.0)
         play_out(player)
-        whole = told(heard)
+        whole = rows_of(received)
         player.seek(3.0)
-        heard.clear()
+        received.clear()
         player.graph.deliver()
-        (backfilled,) = told(heard)
-        heard.clear()
+        (backfilled,) = rows_of(received)
+        received.clear()
         player.resume()
         play_out(player)
-        rest = told(heard)
+        rest = rows_of(received)
     assert whole[-len(rest) - 1 :] == [backfilled, *rest]
     assert rest[0][2] > 3_000_000_000 >= backfilled[2]
 
@@ -213,7 +213,7 @@ def test_services_steer_it(flight, wall, monkeypatch):
         assert not visitor.ours("player/seek", "Seek", time=float("nan")).success
         visitor.ours("player/seek", "Seek", time=1e9)
         assert player.finished
-        assert visitor.put(PLAYING) == 1  # from the end it begins anew
+        assert visitor.put(PLAYING) == 1  # from the end it restarts
         player.wait(0.02)
         assert player.time_s < SECONDS
         assert visitor.call("/step_simulation", step, steps=1).result.result == 3
@@ -221,7 +221,7 @@ def test_services_steer_it(flight, wall, monkeypatch):
         assert player.quitting
 
 
-def test_it_tells_what_it_plays(flight):
+def test_it_publishes_what_it_plays(flight):
     with LogPlayer(flight, paused=True) as player:
         visitor = Visitor(player)
         info = visitor.ours("player/info", "PlayerInfo")
@@ -238,16 +238,16 @@ def test_it_tells_what_it_plays(flight):
 
 def test_round_and_round(tmp_path):
     path = strings(tmp_path / "x.mcap", [0, 10, 20, 30])
-    heard = []
+    received = []
     with LogPlayer(path, speed=None, loop=True) as player:
-        player.graph.subscribe("/a", heard.append, m.String)
+        player.graph.subscribe("/a", received.append, m.String)
         for _ in range(12):
             player.wait(0.0)
         assert not player.paused
         visitor = Visitor(player)
         assert visitor.call("/volery/player/set_loop", "std_srvs/srv/SetBool", data=False).success
         play_out(player)
-    texts = [p.message.data for p in heard]
+    texts = [p.message.data for p in received]
     assert len(texts) > 8
     assert texts[:8] == ["0", "1", "2", "3"] * 2
 
@@ -267,27 +267,27 @@ def strings(path, times_ms, end=True):
 def test_a_flight_that_was_reset_is_one_line(tmp_path):
     """The clock is the log's own, the position goes on."""
     path = strings(tmp_path / "x.mcap", [0, 1000, 2000, 0, 500, 1000])
-    heard = []
+    received = []
     with LogPlayer(path, paused=True) as player:
-        player.graph.subscribe("/a", heard.append, m.String)
+        player.graph.subscribe("/a", received.append, m.String)
         player.wait(0.0)
         assert (player.start_s, player.end_s) == (0.0, 3.0)
         for second, text, clock in ((1.5, "1", 1.5), (2.6, "4", 0.6), (3.0, "5", 1.0)):
             player.seek(second)
             player.graph.deliver()
-            assert heard[-1].message.data == text
+            assert received[-1].message.data == text
             assert player.graph.now_ns() == round(clock * 1e9)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_logs_that_were_cut_off_are_played_as_far_as_they_go(tmp_path, suffix):
     path = strings(tmp_path / f"x{suffix}", [0, 10, 20], end=False)
-    heard = []
+    received = []
     with LogPlayer(path, speed=None) as player:
-        player.graph.subscribe("/a", heard.append, m.String)
+        player.graph.subscribe("/a", received.append, m.String)
         play_out(player)
         assert "index" in player.describe()["problem"]
-    assert [p.message.data for p in heard] == ["0", "1", "2"]
+    assert [p.message.data for p in received] == ["0", "1", "2"]
     assert player.scenario is None
 
 

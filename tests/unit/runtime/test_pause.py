@@ -72,31 +72,31 @@ def test_results_do_not_depend_on_pauses(simulate, flat_data):
     assert simulation.diagnostics.digest() == plain
 
 
-def test_a_paused_run_stands_still_does_what_is_posted_and_tells(simulate, flat_data):
+def test_a_paused_run_stands_still_does_what_is_posted_and_reports(simulate, flat_data):
     simulation = simulate(flat_data)
     uav = simulation.uavs["uav1"]
-    told, load = [], []
+    reports, load = [], []
 
     def on_progress(progress):
-        told.append(progress)
+        reports.append(progress)
         load.append(time.thread_time())  # of the thread that runs
 
     simulation.clock.pause()
     assert simulation.clock.paused
     with InThread(simulation, 0.5, on_progress=on_progress):
-        wait_for(lambda: len(told) >= 3)
-        assert all(progress.paused and progress.time_s == 0.0 for progress in told)
+        wait_for(lambda: len(reports) >= 3)
+        assert all(progress.paused and progress.time_s == 0.0 for progress in reports)
         assert simulation.post(lambda: uav.take_off(2.0)).result(timeout=60.0).command == "take_off"
         assert simulation.time_ns == 0
-        before, start = len(told), time.perf_counter()
+        before, start = len(reports), time.perf_counter()
         time.sleep(1.0)
-        wait_for(lambda: len(told) >= before + 4)
-        calls, elapsed = len(told) - before, time.perf_counter() - start
+        wait_for(lambda: len(reports) >= before + 4)
+        calls, elapsed = len(reports) - before, time.perf_counter() - start
         assert calls <= 10 * elapsed + 2
         assert load[before + calls - 1] - load[before] < 0.05 * elapsed
         simulation.clock.resume()
     assert simulation.time_s == pytest.approx(0.5)
-    assert not told[-1].paused
+    assert not reports[-1].paused
     assert simulation.clock.paused_s > 1.0
     assert uav.mode.name == "TAKE_OFF"
 
@@ -158,5 +158,5 @@ def test_refusals(simulate, flat_data):
         simulation.clock.single_step(0)
     with pytest.raises(CommandError, match="positive real-time factor"):
         simulation.clock.set_speed(-1.0)
-    simulation.step(3)  # the caller's own steps ask nobody
+    simulation.step(3)  # the caller's own steps ignore the pause
     assert simulation.time_ns == 3_000_000

@@ -178,7 +178,7 @@ def test_a_kinematic_uav_stands_on_any_slope(simulate, still):
     np.testing.assert_array_equal(uav.velocity_map, 0.0)
 
 
-def test_missing_files_name_the_places_looked_at(simulate, flat_data):
+def test_missing_files_name_the_folders_searched(simulate, flat_data):
     flat_data["world"] = {"terrain": {"kind": "grid", "file": "no.csv", "spacing_m": 5.0}}
     with pytest.raises(DataFileError, match=r"no file 'no\.csv'"):
         simulate(flat_data)
@@ -206,7 +206,7 @@ def test_nodes_that_do_not_start(simulate, flat_data, node, parameters, words):
     assert words in str(caught.value)
 
 
-def test_feet_in_the_ground_and_places_beyond_the_terrain(simulate, flat_data):
+def test_feet_in_the_ground_and_positions_beyond_the_terrain(simulate, flat_data):
     flat_data["uavs"] = [{"type": "f450", "position_m": [0.0, 0.0, 0.05]}]
     with pytest.raises(PlacementError, match="feet"):
         simulate(flat_data)

@@ -1,4 +1,4 @@
-"""The radio of a running simulation: topics, what stands in the way, faults, snapshots."""
+"""The radio of a running simulation: topics, obstacles, faults, snapshots."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ TOPICS = [{"name": "hello", "type": "std_msgs/msg/String"}]
 
 
 class Talker(Node):
-    """Says its name ten times a second, and counts what it hears from whom."""
+    """Says its name ten times a second, and counts what it receives, by sender."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("talker", **options)
-        self.heard: list[tuple[int, str]] = []
+        self.received: list[tuple[int, str]] = []
         self._says = self.create_publisher(String, "hello")
-        self.create_subscription(String, "radio/hello", self._hear)
+        self.create_subscription(String, "radio/hello", self._receive)
         self.create_timer(0.1, lambda: self._says.publish(String(self.get_namespace())))
 
-    def _hear(self, message: String) -> None:
-        self.heard.append((self.get_clock().now_ns(), message.data))
+    def _receive(self, message: String) -> None:
+        self.received.append((self.get_clock().now_ns(), message.data))
 
     def get_state(self) -> dict[str, Any]:
-        return {"heard": list(self.heard)}
+        return {"received": list(self.received)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        self.heard = list(state["heard"])
+        self.received = list(state["received"])
 
 
 def scenario_of(last_x: float = 60.0, count: int = 3, **radio: Any) -> Any:
@@ -59,21 +59,21 @@ def scenario_of(last_x: float = 60.0, count: int = 3, **radio: Any) -> Any:
     )
 
 
-def heard(simulation: Simulation, row: int = 0) -> list[tuple[int, str]]:
+def received_by(simulation: Simulation, row: int = 0) -> list[tuple[int, str]]:
     node = simulation.vehicles.nodes[row]
     assert isinstance(node, Talker)
-    return node.heard
+    return node.received
 
 
-def test_everybody_with_a_radio_hears_the_others() -> None:
+def test_every_uav_with_a_radio_receives_the_others() -> None:
     with Simulation(scenario_of()) as simulation:
         simulation.run(1.0)
         for row in range(3):
-            said = [name for _, name in heard(simulation, row)]
+            senders = [name for _, name in received_by(simulation, row)]
             others = [f"/uav{k + 1}" for k in range(3) if k != row]
-            assert set(said) == set(others)
-            assert len(said) >= 16
-        late = [time_ns % 100_000_000 for time_ns, _ in heard(simulation)]
+            assert set(senders) == set(others)
+            assert len(senders) >= 16
+        late = [time_ns % 100_000_000 for time_ns, _ in received_by(simulation)]
         assert min(late) >= 2_000_000  # latency and time on the air
         assert "/uav4/radio/hello" not in [topic.name for topic in simulation.graph.topics()]
         assert simulation.vehicles.radio is not None
@@ -83,19 +83,19 @@ def test_everybody_with_a_radio_hears_the_others() -> None:
 def test_ideal_links_take_no_time() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
         simulation.run(1.0)
-        assert len(heard(simulation)) == 20
-        assert {time_ns % 100_000_000 for time_ns, _ in heard(simulation)} == {0}
+        assert len(received_by(simulation)) == 20
+        assert {time_ns % 100_000_000 for time_ns, _ in received_by(simulation)} == {0}
 
 
-def test_a_lost_radio_neither_sends_nor_hears() -> None:
+def test_a_lost_radio_neither_sends_nor_receives() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
         simulation.faults.inject({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
         simulation.run(3.0)
-        missing = [t for t, _ in heard(simulation, 1) if 1.05e9 < t < 2.05e9]
+        missing = [t for t, _ in received_by(simulation, 1) if 1.05e9 < t < 2.05e9]
         assert missing == []
-        to_first = [t for t, name in heard(simulation) if name == "/uav2"]
+        to_first = [t for t, name in received_by(simulation) if name == "/uav2"]
         assert len(to_first) == 20
-        assert len(heard(simulation, 1)) == 40
+        assert len(received_by(simulation, 1)) == 40
         with pytest.raises(CommandError, match="uav4 has no radio; with one: uav1"):
             simulation.faults.inject({"kind": "radio", "uav": "uav4"})
 
@@ -116,11 +116,11 @@ def test_a_jammer_silences_the_radios_near_it_for_others() -> None:
         kept = simulation.snapshot()
         for _ in range(2):
             simulation.run(1.5)
-            during = [[name for t, name in heard(simulation, row) if 1.05e9 < t < 2.05e9]
+            during = [[name for t, name in received_by(simulation, row) if 1.05e9 < t < 2.05e9]
                       for row in (0, 2)]  # fmt: skip
             assert during[1] == []  # the jammer is nearer to it than the others
             assert set(during[0]) == {"/uav2", "/uav3"}
-            after = [name for t, name in heard(simulation, 2) if t > 2.05e9]
+            after = [name for t, name in received_by(simulation, 2) if t > 2.05e9]
             assert set(after) == {"/uav1", "/uav2"}
             assert simulation.faults.active == ()
             simulation.restore(kept)
@@ -130,19 +130,19 @@ def test_a_jammer_is_ended_by_what_describes_it_and_by_a_reset() -> None:
     with Simulation(scenario_of(shadowing_db=0.0)) as simulation:
         simulation.faults.inject(JAMMER)
         simulation.run(1.0)
-        assert heard(simulation, 2) == []
+        assert received_by(simulation, 2) == []
         simulation.faults.end({**JAMMER, "power_dbm": 21.0})  # another one
         simulation.run(0.5)
-        assert heard(simulation, 2) == []
+        assert received_by(simulation, 2) == []
         simulation.faults.end(JAMMER)
         simulation.run(0.5)
-        assert heard(simulation, 2) != []
+        assert received_by(simulation, 2) != []
         simulation.faults.inject(JAMMER)
         simulation.run(0.5)
         simulation.reset()
         simulation.run(0.5)
         assert simulation.faults.active == ()
-        assert heard(simulation, 2) != []
+        assert received_by(simulation, 2) != []
 
 
 def test_jamming_needs_radios_whose_links_are_modelled() -> None:
@@ -159,17 +159,17 @@ def test_jamming_needs_radios_whose_links_are_modelled() -> None:
 def test_a_snapshot_holds_what_is_on_the_air() -> None:
     with Simulation(scenario_of(latency_s=0.03, power_dbm=-18.0)) as simulation:
         simulation.diagnostics.enable_digest()
-        simulation.run(1.01)  # said, not yet heard
+        simulation.run(1.01)  # sent, not yet received
         kept = simulation.snapshot()
         simulation.run(1.5)
-        first, digest = heard(simulation), simulation.diagnostics.digest()
+        first, digest = received_by(simulation), simulation.diagnostics.digest()
         simulation.restore(kept)
         simulation.run(1.5)
-        assert heard(simulation) == first
+        assert received_by(simulation) == first
         assert simulation.diagnostics.digest() == digest
         simulation.reset(seed=9)
         simulation.run(2.51)
-        assert heard(simulation) != first
+        assert received_by(simulation) != first
 
 
 @pytest.mark.parametrize("slices", [1, 7])
@@ -184,30 +184,30 @@ def test_slicing_and_threads_change_nothing(slices: int) -> None:
     assert digests[0] == digests[1]
 
 
-def test_a_uav_that_comes_later_is_heard() -> None:
+def test_a_uav_that_comes_later_is_received() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
         simulation.run(0.5)
         simulation.vehicles.spawn("late", "talker", [30.0, 20.0, 0.0])
         simulation.run(0.5)
-        assert "/late" in {name for _, name in heard(simulation)}
+        assert "/late" in {name for _, name in received_by(simulation)}
         simulation.vehicles.delete("late")
         simulation.run(0.5)
-        assert heard(simulation)[-1][0] > 1.3e9
+        assert received_by(simulation)[-1][0] > 1.3e9
 
 
 @pytest.mark.parametrize("links", ["ideal", "modelled"])
-def test_a_uav_in_the_place_of_another_has_a_radio_of_its_own(links: str) -> None:
+def test_a_uav_that_replaces_another_has_a_radio_of_its_own(links: str) -> None:
     with Simulation(scenario_of(links=links)) as simulation:
         for _ in range(2):
             row = len(simulation.vehicles.nodes)
             simulation.vehicles.spawn("uav9", "talker", [30.0, 20.0, 0.0])
             simulation.run(0.5)
-            said = [name for _, name in heard(simulation)]
-            assert said.count("/uav9") >= 4
-            assert 8 <= len(heard(simulation, row)) <= 15  # of three, and nothing of before
+            senders = [name for _, name in received_by(simulation)]
+            assert senders.count("/uav9") >= 4
+            assert 8 <= len(received_by(simulation, row)) <= 15  # of three, and nothing of before
             simulation.vehicles.delete("uav9")
             simulation.run(0.5)
-            heard(simulation).clear()
+            received_by(simulation).clear()
 
 
 def test_what_stands_between() -> None:

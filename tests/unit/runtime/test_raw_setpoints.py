@@ -34,7 +34,7 @@ def target(mask, frame=1, **fields):
     return message
 
 
-def test_commands_that_are_none_are_told_of_once_a_topic(simulation, caplog):
+def test_invalid_commands_are_reported_once_per_topic(simulation, caplog):
     graph = simulation.graph
     twist = zero_message("geometry_msgs/msg/Twist")
     twist.linear.x = math.nan
@@ -46,10 +46,12 @@ def test_commands_that_are_none_are_told_of_once_a_topic(simulation, caplog):
             publisher.publish(message)
             graph.deliver()
         publisher.cancel()
-    told = [text for text in caplog.messages if "is not obeyed" in text]
-    assert len(told) == 2
-    assert told[0].startswith("/uav1/cmd_vel: ")
-    assert told[1] == "/uav1/goal_pose: a command is not obeyed: goals are in 'map', not in 'moon'"
+    warnings = [text for text in caplog.messages if "is not obeyed" in text]
+    assert len(warnings) == 2
+    assert warnings[0].startswith("/uav1/cmd_vel: ")
+    assert (
+        warnings[1] == "/uav1/goal_pose: a command is not obeyed: goals are in 'map', not in 'moon'"
+    )
 
 
 def test_masks_say_what_counts(simulation):
@@ -65,9 +67,9 @@ def test_masks_say_what_counts(simulation):
         steer_to_message(uav, message)
         simulation.run(0.2)
     assert uav.velocity_map == pytest.approx([0.0, 1.0, 0.0], abs=0.1)  # it looks north now
-    place = target(7 << 3 | 7 << 6 | 1024 | 2048)
-    place.position.z = 3.0
-    steer_to_message(uav, place)
+    setpoint = target(7 << 3 | 7 << 6 | 1024 | 2048)
+    setpoint.position.z = 3.0
+    steer_to_message(uav, setpoint)
     simulation.run(6.0)
     assert uav.position_map == pytest.approx([0.0, 0.0, 3.0], abs=0.3)
 
@@ -81,7 +83,7 @@ def test_what_says_nothing_is_refused(simulation, mask, frame):
         steer_to_message(simulation.uavs["uav1"], target(mask, frame))
 
 
-def test_thrust_is_a_share_and_attitudes_are_checked(simulation):
+def test_thrust_is_a_fraction_and_attitudes_are_checked(simulation):
     uav = simulation.uavs["uav1"]
     message = zero_message(ATTITUDE)
     message.type_mask, message.thrust, message.orientation.w = 7, 1.5, 1.0
@@ -92,21 +94,21 @@ def test_thrust_is_a_share_and_attitudes_are_checked(simulation):
         turn_to_message(uav, message)
 
 
-def test_state_comes_where_a_node_listens_and_tells_the_truth(simulation):
-    heard = []
+def test_state_comes_where_a_node_subscribes_and_is_the_truth(simulation):
+    received = []
     publisher_type = "volery_interfaces/msg/FlightState"
-    subscription = simulation.graph.subscribe("/uav1/flight_state", heard.append, publisher_type)
+    subscription = simulation.graph.subscribe("/uav1/flight_state", received.append, publisher_type)
     simulation.run(0.5)
     subscription.cancel()
-    assert len(heard) == pytest.approx(50, abs=1)
-    state, uav = heard[-1].message, simulation.uavs["uav1"]
+    assert len(received) == pytest.approx(50, abs=1)
+    state, uav = received[-1].message, simulation.uavs["uav1"]
     assert state.mode == uav.mode.name
     assert state.airborne
-    place = state.pose.position
-    assert (place.x, place.y, place.z) == pytest.approx(tuple(uav.position_map), abs=0.05)
-    count = len(heard)
+    position = state.pose.position
+    assert (position.x, position.y, position.z) == pytest.approx(tuple(uav.position_map), abs=0.05)
+    count = len(received)
     simulation.run(0.1)
-    assert len(heard) == count
+    assert len(received) == count
     build = simulation.graph.call("/uav1/get_vehicle_info")
     assert (build.airframe, build.rotors) == ("f450", 4)
     assert build.latitude == pytest.approx(47.397742)

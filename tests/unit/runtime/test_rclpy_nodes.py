@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent / "rclpy_nodes"
 
 @pytest.fixture(autouse=True)
 def no_stand_ins_left(monkeypatch, without_ros1):
-    """Each test loads its modules anew and leaves no stand-ins."""
+    """Each test reloads its modules and leaves no stand-ins."""
     monkeypatch.chdir(FOLDER)
     yield
     withdraw_ros_imports()
@@ -46,8 +46,8 @@ def fly(simulate, flat_data):
 
 def test_a_publisher_with_a_timer(fly):
     simulation, logs = fly("Talker")
-    said = [(entry.stamp.sec, entry.stamp.nanosec, entry.msg) for entry in logs]
-    assert said == [
+    entries = [(entry.stamp.sec, entry.stamp.nanosec, entry.msg) for entry in logs]
+    assert entries == [
         (k // 2, k % 2 * 500_000_000, f"publishing 'hello {k - 1}'") for k in range(1, 5)
     ]
     first = logs[0]
@@ -99,10 +99,10 @@ def test_what_a_node_says_while_it_is_made_is_recorded(simulate, flat_data, tmp_
     monkeypatch.chdir(tmp_path)
     flat_data["types"]["f450"]["nodes"] = [{"node": "early_words:Early"}]
     simulation = simulate(flat_data)
-    heard = []
-    simulation.graph.subscribe_all(heard.append)
+    received = []
+    simulation.graph.subscribe_all(received.append)
     simulation.run(0.01)
-    assert [(p.message.level, p.message.msg) for p in heard if p.topic == "/rosout"] == [
+    assert [(p.message.level, p.message.msg) for p in received if p.topic == "/rosout"] == [
         (30, "one"),
         (40, "two"),
     ]
@@ -114,14 +114,14 @@ def test_a_message_may_be_used_again_after_its_publication(simulate, flat_data):
 
     context = Context(simulation.graph, simulation._engine, lambda: simulation.time_ns)
     node = Node("again", context=context)
-    heard = []
-    node.create_subscription(String, "text", lambda m: heard.append(m.data))
+    received = []
+    node.create_subscription(String, "text", lambda m: received.append(m.data))
     publisher, message = node.create_publisher(String, "text"), String()
     for text in ("a", "b"):
         message.data = text
         publisher.publish(message)
     simulation.run(0.01)
-    assert heard == ["a", "b"]
+    assert received == ["a", "b"]
 
 
 def test_unknown_types_and_modules_are_import_errors(tmp_path, monkeypatch, simulate, flat_data):

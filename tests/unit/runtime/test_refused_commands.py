@@ -47,19 +47,19 @@ def goal(frame="map", x=2.0):
     return message
 
 
-def told_about(simulation, topic, *messages):
-    """Returns what a client is told, and what the log records, about its messages."""
-    told, logged = [], []
+def refusals_of(simulation, topic, *messages):
+    """Returns the errors that a client receives, and what the log records, about its messages."""
+    errors, logged = [], []
     log = simulation.graph.subscribe(TOPIC, lambda p: logged.append(p.message), TYPE)
     session = simulation.gateway.open("client")
-    session.on_refused = told.append
+    session.on_refused = errors.append
     session.advertise(topic, messages[0].__msgtype__)
     for message in messages:
         session.publish(topic, message)
     simulation.run(0.1)
     session.close()
     log.cancel()
-    return told, [(r.client, r.name, r.content) for r in logged if r.kind == "refused"]
+    return errors, [(r.client, r.name, r.content) for r in logged if r.kind == "refused"]
 
 
 @pytest.mark.parametrize(
@@ -67,15 +67,15 @@ def told_about(simulation, topic, *messages):
     [(goal("moon"), "goals are in 'map', not in 'moon'"), (goal(x=math.nan), "finite")],
 )
 def test_a_goal_that_cannot_be(flying, message, words):
-    told, logged = told_about(flying, "/uav1/goal_pose", message)
-    assert len(told) == 1
-    assert told[0].startswith("/uav1/goal_pose: ")
-    assert words in told[0]
-    assert logged == [("client", "/uav1/goal_pose", told[0].partition(": ")[2])]
+    errors, logged = refusals_of(flying, "/uav1/goal_pose", message)
+    assert len(errors) == 1
+    assert errors[0].startswith("/uav1/goal_pose: ")
+    assert words in errors[0]
+    assert logged == [("client", "/uav1/goal_pose", errors[0].partition(": ")[2])]
 
 
 def test_a_goal_in_the_map_with_a_slash(flying):
-    assert told_about(flying, "/uav1/goal_pose", goal("/map")) == ([], [])
+    assert refusals_of(flying, "/uav1/goal_pose", goal("/map")) == ([], [])
     flying.run(10.0)
     assert flying.uavs["uav1"].position_map[0] == pytest.approx(2.0, abs=0.1)
 
@@ -86,7 +86,7 @@ def test_a_goal_in_the_map_with_a_slash(flying):
 def test_a_goal_has_the_heading_of_its_quaternion_whatever_its_length(flying, z, w, degrees):
     message = goal()
     message.pose.orientation.z, message.pose.orientation.w = z, w
-    assert told_about(flying, "/uav1/goal_pose", message) == ([], [])
+    assert refusals_of(flying, "/uav1/goal_pose", message) == ([], [])
     flying.run_until(lambda: abs(heading_deg(flying) - degrees) < 2.0, timeout_s=30.0)
     flying.run(1.0)
     assert heading_deg(flying) == pytest.approx(degrees, abs=2.0)
@@ -104,7 +104,7 @@ def test_a_trajectory_has_the_heading_of_its_quaternion(flying):
     transform.rotation.z = transform.rotation.w = 0.65  # 0.92 long
     point.transforms, point.time_from_start.sec = [transform], 4
     message.points = [point]
-    assert told_about(flying, "/uav1/trajectory", message) == ([], [])
+    assert refusals_of(flying, "/uav1/trajectory", message) == ([], [])
     flying.run(8.0)
     assert heading_deg(flying) == pytest.approx(90.0, abs=2.0)
 
@@ -116,43 +116,43 @@ def test_a_trajectory_without_rotation(flying):
     transform.rotation.w = 0.0
     point.transforms = [transform]
     message.points = [point]
-    told, _ = told_about(flying, "/uav1/trajectory", message)
-    assert "unit quaternions" in told[0]
+    errors, _ = refusals_of(flying, "/uav1/trajectory", message)
+    assert "unit quaternions" in errors[0]
 
 
 def test_a_pose_of_a_uav_that_flies_by_itself(flying):
-    told, logged = told_about(flying, "/uav1/pose_command", goal())
-    assert len(told) == len(logged) == 1
+    errors, logged = refusals_of(flying, "/uav1/pose_command", goal())
+    assert len(errors) == len(logged) == 1
 
 
 def test_a_goal_on_the_ground_and_during_take_off(simulation):
-    told, _ = told_about(simulation, "/uav1/goal_pose", goal())
-    assert "must take off first" in told[0]
+    errors, _ = refusals_of(simulation, "/uav1/goal_pose", goal())
+    assert "must take off first" in errors[0]
     simulation.uavs["uav1"].take_off(3.0)
     simulation.run(0.5)
-    told, _ = told_about(simulation, "/uav1/goal_pose", goal())
-    assert "TAKE_OFF" in told[0]
+    errors, _ = refusals_of(simulation, "/uav1/goal_pose", goal())
+    assert "TAKE_OFF" in errors[0]
 
 
 def test_a_stream_on_the_ground_is_no_news(simulation):
     twist = zero_message("geometry_msgs/msg/Twist")
-    assert told_about(simulation, "/uav1/cmd_vel", twist, twist) == ([], [])
+    assert refusals_of(simulation, "/uav1/cmd_vel", twist, twist) == ([], [])
 
 
-def test_a_stream_of_refusals_is_told_once(flying, monkeypatch):
+def test_a_stream_of_refusals_is_reported_once(flying, monkeypatch):
     monkeypatch.setattr("volery.graph.session._REFUSAL_PERIOD_S", 1e9)
-    told, logged = told_about(flying, "/uav1/goal_pose", *[goal("moon")] * 30)
-    assert len(told) == 1
+    errors, logged = refusals_of(flying, "/uav1/goal_pose", *[goal("moon")] * 30)
+    assert len(errors) == 1
     assert len(logged) == 30
     frames = [goal(f"moon{k}") for k in range(30)]
-    assert len(told_about(flying, "/uav1/goal_pose", *frames)[0]) == 20
+    assert len(refusals_of(flying, "/uav1/goal_pose", *frames)[0]) == 20
 
 
 def test_weather_that_cannot_be(flying):
     message = zero_message("volery_interfaces/msg/Weather")
     message.rain = math.nan
-    told, _ = told_about(flying, "/weather_command", message)
-    assert len(told) == 1
+    errors, _ = refusals_of(flying, "/weather_command", message)
+    assert len(errors) == 1
 
 
 def test_a_client_of_ros_tcp_receives_an_error(flying):

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from service_calls import ask
+from service_calls import call_service
 
 from volery.core.errors import CommandError
 from volery.runtime import Simulation
@@ -18,13 +18,13 @@ from volery.vehicle.airframe import airframe_names
 
 
 def test_what_can_be_chosen(simulate, flat_data):
-    told = ask(simulate(flat_data), "/volery/get_scenario_options")
-    assert told.success
-    assert list(told.scenarios) == library.names()
-    assert tuple(told.airframes) == airframe_names()
-    assert list(told.sensor_sets) == ["lidar", "camera", "sonar", "navigation"]
-    assert len(told.sensor_set_descriptions) == 4
-    schema = json.loads(told.changes_schema)
+    options = call_service(simulate(flat_data), "/volery/get_scenario_options")
+    assert options.success
+    assert list(options.scenarios) == library.names()
+    assert tuple(options.airframes) == airframe_names()
+    assert list(options.sensor_sets) == ["lidar", "camera", "sonar", "navigation"]
+    assert len(options.sensor_set_descriptions) == 4
+    schema = json.loads(options.changes_schema)
     assert schema["properties"]["uavs"]["anyOf"][0]["maximum"] == 10_000
 
 
@@ -32,13 +32,13 @@ def test_a_scenario_is_loaded_with_changes(simulate, flat_data):
     asked = []
     simulation = simulate(flat_data, on_load=asked.append)
     changes = {"uavs": 5, "airframe": "crazyflie", "sensors": ["lidar", "camera"], "seed": 3}
-    answer = ask(
+    response = call_service(
         simulation, "/volery/load_scenario", scenario="longleaf", changes=json.dumps(changes)
     )
-    assert answer.success, answer.message
+    assert response.success, response.message
     wanted = Changes(uavs=5, airframe="crazyflie", sensors=("lidar", "camera"), seed=3)
     assert asked == [WorldRequest("longleaf", wanted)]
-    assert ask(simulation, "/volery/load_scenario", scenario="hover").success
+    assert call_service(simulation, "/volery/load_scenario", scenario="hover").success
     assert asked[1] == WorldRequest("hover", Changes())
 
 
@@ -60,11 +60,11 @@ def test_what_cannot_be_is_refused_before_the_world_goes(
 ):
     asked = []
     simulation = simulate(flat_data, on_load=asked.append)
-    answer = ask(
+    response = call_service(
         simulation, "/volery/load_scenario", scenario=scenario, changes=json.dumps(changes)
     )
-    assert not answer.success
-    assert all(word in answer.message for word in words), answer.message
+    assert not response.success
+    assert all(word in response.message for word in words), response.message
     assert asked == []
 
 
@@ -78,11 +78,11 @@ def test_a_scenario_whose_packages_are_missing_does_not_end_the_flight(
     simulation = simulate(flat_data, on_load=asked.append)
     if service == "/load_world":
         fields = {"world_resource": {"uri": "forest_search"}}
-        answer = ask(simulation, service, **fields).result
-        message, done = answer.error_message, answer.result == 1
+        response = call_service(simulation, service, **fields).result
+        message, done = response.error_message, response.result == 1
     else:
-        answer = ask(simulation, service, scenario="forest_search")
-        message, done = answer.message, answer.success
+        response = call_service(simulation, service, scenario="forest_search")
+        message, done = response.message, response.success
     assert not done
     assert message == (
         'forest_search: slam needs gtsam, global_planner needs ompl: pip install "volery[autonomy]"'
@@ -101,9 +101,11 @@ def test_a_scenario_whose_node_cannot_be_imported_does_not_end_the_flight(
     asked = []
     simulation = simulate(flat_data, on_load=asked.append, shelf=ScenarioCatalog(given=given))
     if service == "/load_world":
-        message = ask(simulation, service, world_resource={"uri": "own"}).result.error_message
+        message = call_service(
+            simulation, service, world_resource={"uri": "own"}
+        ).result.error_message
     else:
-        message = ask(simulation, service, scenario="own").message
+        message = call_service(simulation, service, scenario="own").message
     assert message.startswith("own: nodes[0]: ")
     assert "cannot be imported" in message
     assert asked == []
@@ -127,23 +129,23 @@ def test_a_scenario_whose_world_file_is_gone_does_not_end_the_flight(
     given = parse_scenario({**flat_data, "name": "own", "world": world})
     asked = []
     simulation = simulate(flat_data, on_load=asked.append, shelf=ScenarioCatalog(given=given))
-    message = ask(simulation, "/volery/load_scenario", scenario="own").message
+    message = call_service(simulation, "/volery/load_scenario", scenario="own").message
     assert message.startswith(f"own: {where}: ")
     assert "gone.csv" in message
     assert asked == []
 
 
 def test_loading_is_the_owners_business(simulate, flat_data):
-    answer = ask(simulate(flat_data), "/volery/load_scenario", scenario="hover")
-    assert not answer.success
-    assert "one scenario" in answer.message
+    response = call_service(simulate(flat_data), "/volery/load_scenario", scenario="hover")
+    assert not response.success
+    assert "one scenario" in response.message
 
     def refuse(request):
         raise CommandError(f"no memory for {request.name}")
 
     simulation = simulate(flat_data, on_load=refuse)
-    answer = ask(simulation, "/volery/load_scenario", scenario="hover")
-    assert (answer.success, answer.message) == (False, "no memory for hover")
+    response = call_service(simulation, "/volery/load_scenario", scenario="hover")
+    assert (response.success, response.message) == (False, "no memory for hover")
 
 
 def test_many_uavs_with_other_sensors_are_built():
@@ -151,8 +153,8 @@ def test_many_uavs_with_other_sensors_are_built():
     scenario = apply(load_scenario("hover"), changes)
     with Simulation(scenario, threads=1) as simulation:
         assert len(simulation.uavs) == 30
-        places = np.array([uav.position_map for uav in simulation.uavs.values()])
-        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 10.0 * np.eye(30)
+        positions = np.array([uav.position_map for uav in simulation.uavs.values()])
+        apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + 10.0 * np.eye(30)
         assert apart.min() > 1.0
         topics = {topic.name for topic in simulation.graph.topics()}
         assert {"/uav30/gnss", "/uav30/range"} & topics
@@ -162,8 +164,8 @@ def test_many_uavs_with_other_sensors_are_built():
 
 
 def test_a_thinned_inventory_holds_the_same_trees():
-    def forest(share):
-        scenario = apply(load_scenario("longleaf"), Changes(tree_share=share))
+    def forest(fraction):
+        scenario = apply(load_scenario("longleaf"), Changes(tree_share=fraction))
         return build_forest(scenario, build_terrain(scenario))
 
     whole, half, few = forest(1.0), forest(0.5), forest(0.2)
@@ -173,8 +175,8 @@ def test_a_thinned_inventory_holds_the_same_trees():
 
     def trees(of):
         return {
-            (*place, dbh)
-            for place, dbh in zip(of.position_map.tolist(), of.dbh_m.tolist(), strict=True)
+            (*position, dbh)
+            for position, dbh in zip(of.position_map.tolist(), of.dbh_m.tolist(), strict=True)
         }
 
     assert trees(few) < trees(half) < trees(whole)

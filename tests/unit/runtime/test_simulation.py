@@ -96,10 +96,10 @@ def test_real_time_and_faster(simulate, flat_data, monkeypatch):
     start_s = clock.now_s
     simulation.run(0.5, speed=1.0)
     assert clock.now_s - start_s == pytest.approx(0.5, abs=0.02)
-    told = []
-    simulation.run(0.5, speed=2.0, on_progress=told.append)
-    assert told[-1].time_s == pytest.approx(0.5)
-    assert told[-1].real_time_factor == pytest.approx(2.0, rel=0.05)
+    reports = []
+    simulation.run(0.5, speed=2.0, on_progress=reports.append)
+    assert reports[-1].time_s == pytest.approx(0.5)
+    assert reports[-1].real_time_factor == pytest.approx(2.0, rel=0.05)
 
 
 def test_single_steps(simulate, flat_data):
@@ -242,9 +242,9 @@ def test_a_failing_node_is_named(simulate, flat_data, tmp_path, monkeypatch, whe
         "        super().__init__('bad', **options)\n"
         f"        if '{where}' == 'constructor': {{}}['x']\n"
         "        self.create_timer(0.1, self.tick)\n"
-        "        self.create_subscription(Range, 'range', self.hear, 1)\n"
+        "        self.create_subscription(Range, 'range', self.receive, 1)\n"
         f"    def tick(self):\n        if '{where}' == 'timer': 1 / 0\n"
-        f"    def hear(self, _):\n        if '{where}' == 'message': 1 / 0\n"
+        f"    def receive(self, _):\n        if '{where}' == 'message': 1 / 0\n"
     )
     monkeypatch.chdir(tmp_path)  # the working folder is searched for modules
     flat_data["types"]["f450"]["nodes"] = [{"node": f"bad_{where}:Bad"}]
@@ -256,16 +256,16 @@ def test_a_failing_node_is_named(simulate, flat_data, tmp_path, monkeypatch, whe
 
 
 def trajectory(points, frame="map"):
-    """A MultiDOFJointTrajectory of (time, place, velocity) for the vehicle."""
+    """A MultiDOFJointTrajectory of (time, position, velocity) for the vehicle."""
     zero = Vector3(0.0, 0.0, 0.0)
     made = [
         MultiDOFJointTrajectoryPoint(
-            [Transform(Vector3(*map(float, place)), Quaternion(0.0, 0.0, 0.0, 1.0))],
+            [Transform(Vector3(*map(float, position)), Quaternion(0.0, 0.0, 0.0, 1.0))],
             [Twist(Vector3(*map(float, velocity)), zero)],
             [],
             Duration(int(t), round(1e9 * (t % 1))),
         )
-        for t, place, velocity in points
+        for t, position, velocity in points
     ]
     return MultiDOFJointTrajectory(header(0, frame), ["base_link"], made)
 
@@ -273,12 +273,12 @@ def trajectory(points, frame="map"):
 def test_a_trajectory_message_is_flown(simulate, flat_data):
     flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 20.0]
     simulation = simulate(flat_data)
-    way = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
+    publisher = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
     uav = simulation.uavs["uav1"]
-    way.publish(trajectory([(0, (9, 9, 9), (0, 0, 0))], frame="odom"))
+    publisher.publish(trajectory([(0, (9, 9, 9), (0, 0, 0))], frame="odom"))
     simulation.run(0.1)
     assert uav.mode.name == "HOLD"  # not in the map: ignored
-    way.publish(
+    publisher.publish(
         trajectory(
             [(0, (0, 0, 20), (0, 0, 0)), (2.5, (3, 0, 21), (1, 0, 0)), (5, (4, 0, 21), (0,) * 3)]
         )
@@ -294,14 +294,14 @@ def test_a_trajectory_message_is_flown(simulate, flat_data):
 def test_one_point_is_a_setpoint_and_a_late_one_a_goal(simulate, flat_data):
     flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 20.0]
     simulation = simulate(flat_data)
-    way = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
+    publisher = simulation.graph.advertise("/uav1/trajectory", MultiDOFJointTrajectory)
     uav = simulation.uavs["uav1"]
-    way.publish(trajectory([(0, (0, 0, 20), (1, 0, 0))]))
+    publisher.publish(trajectory([(0, (0, 0, 20), (1, 0, 0))]))
     simulation.run(0.4)
     assert uav.mode.name == "TRAJECTORY"
     simulation.run(0.4)
     assert uav.mode.name == "HOLD"  # nothing came after it
-    way.publish(trajectory([(4, (2, 3, 22), (0, 0, 0))]))
+    publisher.publish(trajectory([(4, (2, 3, 22), (0, 0, 0))]))
     simulation.run(7.0)
     np.testing.assert_allclose(uav.position_map, (2, 3, 22), atol=0.05)
 
@@ -335,10 +335,10 @@ def test_poses_on_the_topic_move_odometry_and_imu(simulate, flat_data):
     flat_data["uavs"] = [{"type": "mover", "position_m": [0.0, 0.0, 4.0]}]
     simulation = simulate(flat_data)
     twists, forces = {"ground_truth/odom": [], "odom": []}, []
-    for name, heard in twists.items():
+    for name, received in twists.items():
         simulation.graph.subscribe(
             f"/uav1/{name}",
-            lambda p, heard=heard: heard.append(p.message.twist.twist.linear.x),
+            lambda p, received=received: received.append(p.message.twist.twist.linear.x),
             Odometry,
         )
     simulation.graph.subscribe(
@@ -347,11 +347,11 @@ def test_poses_on_the_topic_move_odometry_and_imu(simulate, flat_data):
     poses = simulation.graph.advertise("/uav1/pose_command", PoseStamped)
     for k in range(60):
         stamp = header(20_000_000 * k, "map")
-        place = Point(0.04 * k, 0.0, 4.0)
-        poses.publish(PoseStamped(stamp, Pose(place, Quaternion(0.0, 0.0, 0.0, 1.0))))
+        position = Point(0.04 * k, 0.0, 4.0)
+        poses.publish(PoseStamped(stamp, Pose(position, Quaternion(0.0, 0.0, 0.0, 1.0))))
         simulation.run(0.02)
-    for heard in twists.values():
-        assert heard[-1] == pytest.approx(2.0, abs=0.1)
+    for received in twists.values():
+        assert received[-1] == pytest.approx(2.0, abs=0.1)
     assert np.abs(forces).max() < 105.0
     assert np.abs(forces[-20:]).max() < 1.0
 

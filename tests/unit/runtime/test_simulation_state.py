@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from service_calls import ask, ask_later, code_of
+from service_calls import call_service, code_of, start_call
 from test_pause import InThread, wait_for
 
 from volery.core.errors import CommandError, GraphError
@@ -17,11 +17,11 @@ ALREADY, WRONG_TRANSITION, NO_RESOURCE = 101, 103, 102
 
 
 def state(simulation):
-    return ask(simulation, "/get_simulation_state").state.state
+    return call_service(simulation, "/get_simulation_state").state.state
 
 
 def enter(simulation, wanted):
-    return code_of(ask(simulation, "/set_simulation_state", state={"state": wanted}))
+    return code_of(call_service(simulation, "/set_simulation_state", state={"state": wanted}))
 
 
 def test_features_name_what_works_alone(simulate, flat_data):
@@ -79,32 +79,32 @@ def test_reset(simulate, flat_data):
     simulation = simulate(flat_data)
     for scope in (0, 1 | 2, 1 | 2 | 4, 255):
         simulation.run(0.1)
-        assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == OK
+        assert code_of(call_service(simulation, "/reset_simulation", scope=scope)) == OK
         assert simulation.time_ns == 0
     for scope, code in ((1, UNSUPPORTED), (2, UNSUPPORTED), (64, FAILED)):
-        assert code_of(ask(simulation, "/reset_simulation", scope=scope)) == code
+        assert code_of(call_service(simulation, "/reset_simulation", scope=scope)) == code
 
 
 def test_reset_of_what_was_spawned(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.1)
     simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
-    response = ask(simulation, "/reset_simulation", scope=1 | 2)
+    response = call_service(simulation, "/reset_simulation", scope=1 | 2)
     assert code_of(response) == UNSUPPORTED
     assert "SCOPE_SPAWNED" in response.result.error_message
-    assert code_of(ask(simulation, "/reset_simulation", scope=4)) == OK
+    assert code_of(call_service(simulation, "/reset_simulation", scope=4)) == OK
     assert simulation.vehicles.names == ("uav1",)
     assert simulation.time_ns == 100_000_000
     simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
-    assert code_of(ask(simulation, "/reset_simulation", scope=1 | 2 | 4)) == OK
+    assert code_of(call_service(simulation, "/reset_simulation", scope=1 | 2 | 4)) == OK
     assert simulation.vehicles.names == ("uav1",)
     assert simulation.time_ns == 0
 
 
-def test_a_reset_that_cannot_be_is_told(simulate, flat_data):
+def test_a_reset_that_cannot_be_is_reported(simulate, flat_data):
     simulation = simulate(flat_data)
     partner = simulation.clock.add_partner("other", period_s=0.1)
-    response = ask(simulation, "/reset_simulation")
+    response = call_service(simulation, "/reset_simulation")
     assert code_of(response) == FAILED
     assert "other" in response.result.error_message
     assert enter(simulation, STOPPED) == 102
@@ -115,8 +115,8 @@ def test_a_reset_that_cannot_be_is_told(simulate, flat_data):
 def test_steps_are_answered_when_they_are_made(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.pause()
-    first = ask_later(simulation, "/step_simulation", steps=7)
-    second = ask_later(simulation, "/step_simulation", steps=250)
+    first = start_call(simulation, "/step_simulation", steps=7)
+    second = start_call(simulation, "/step_simulation", steps=250)
     assert not first
     with InThread(simulation, 5.0):
         wait_for(lambda: second)
@@ -129,16 +129,16 @@ def test_steps_are_answered_when_they_are_made(simulate, flat_data):
 def test_steps_that_are_none(simulate, flat_data, steps, code):
     simulation = simulate(flat_data)
     simulation.clock.pause()
-    (response,) = ask_later(simulation, "/step_simulation", steps=steps)
+    (response,) = start_call(simulation, "/step_simulation", steps=steps)
     assert code_of(response) == code
 
 
 def test_steps_while_playing_are_refused(simulate, flat_data):
     simulation = simulate(flat_data)
-    (response,) = ask_later(simulation, "/step_simulation", steps=1)
+    (response,) = start_call(simulation, "/step_simulation", steps=1)
     assert code_of(response) == INCORRECT_STATE
     with pytest.raises(GraphError, match="call_async"):
-        ask(simulation, "/step_simulation", steps=1)
+        call_service(simulation, "/step_simulation", steps=1)
 
 
 @pytest.mark.parametrize(
@@ -153,29 +153,31 @@ def test_steps_while_playing_are_refused(simulate, flat_data):
 def test_steps_that_are_interrupted_are_answered(simulate, flat_data, end, why):
     simulation = simulate(flat_data)
     simulation.clock.pause()
-    answers = ask_later(simulation, "/step_simulation", steps=5)
+    responses = start_call(simulation, "/step_simulation", steps=5)
     end(simulation)
-    assert code_of(answers[0]) == FAILED
-    assert "0 of 5" in answers[0].result.error_message
-    assert why in answers[0].result.error_message
+    assert code_of(responses[0]) == FAILED
+    assert "0 of 5" in responses[0].result.error_message
+    assert why in responses[0].result.error_message
 
 
 def send(simulation, steps):
-    told, ended = [], []
+    feedback, ended = [], []
     goal = message_type("simulation_interfaces/action/SimulateSteps_Goal")(steps=steps)
     actions = simulation.graph.actions
-    handle = actions.send_goal("/simulate_steps", goal, told.append, lambda *how: ended.append(how))
-    return handle, told, ended
+    handle = actions.send_goal(
+        "/simulate_steps", goal, feedback.append, lambda *how: ended.append(how)
+    )
+    return handle, feedback, ended
 
 
-def test_the_action_tells_how_far_it_is(simulate, flat_data):
+def test_the_action_reports_its_progress(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.clock.pause()
-    goal, told, ended = send(simulation, 350)
+    goal, feedback, ended = send(simulation, 350)
     with InThread(simulation, 5.0):
         wait_for(lambda: ended)
         simulation.clock.quit()
-    progress = [(one.completed_steps, one.remaining_steps) for one in told]
+    progress = [(one.completed_steps, one.remaining_steps) for one in feedback]
     assert progress == [(100, 250), (200, 150), (300, 50), (350, 0)]
     ((status, response),) = ended
     assert status is GoalStatus.SUCCEEDED
@@ -206,13 +208,13 @@ def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
 
 def test_worlds_are_the_scenarios_of_the_library(simulate, flat_data):
     simulation = simulate(flat_data)
-    worlds = ask(simulation, "/get_available_worlds").worlds
+    worlds = call_service(simulation, "/get_available_worlds").worlds
     assert [world.world_resource.uri for world in worlds] == library.names()
-    woods = ask(simulation, "/get_available_worlds", filter={"tags": ["forest"]}).worlds
+    woods = call_service(simulation, "/get_available_worlds", filter={"tags": ["forest"]}).worlds
     assert 0 < len(woods) < len(worlds)
-    response = ask(simulation, "/get_available_worlds", additional_sources=["/tmp"])
+    response = call_service(simulation, "/get_available_worlds", additional_sources=["/tmp"])
     assert code_of(response) == UNSUPPORTED
-    current = ask(simulation, "/get_current_world").world
+    current = call_service(simulation, "/get_current_world").world
     assert current.name == "flat"
     assert current.world_resource.uri == ""
 
@@ -220,11 +222,11 @@ def test_worlds_are_the_scenarios_of_the_library(simulate, flat_data):
 def test_loading_is_the_owners_business(simulate, flat_data):
     wanted = {"world_resource": {"uri": "hover"}}
     alone = simulate(flat_data)
-    assert code_of(ask(alone, "/load_world", **wanted)) == UNSUPPORTED
-    assert code_of(ask(alone, "/unload_world")) == UNSUPPORTED
+    assert code_of(call_service(alone, "/load_world", **wanted)) == UNSUPPORTED
+    assert code_of(call_service(alone, "/unload_world")) == UNSUPPORTED
     loaded = []
     simulation = simulate(flat_data, on_load=loaded.append)
-    response = ask(simulation, "/load_world", **wanted)
+    response = call_service(simulation, "/load_world", **wanted)
     assert code_of(response) == OK
     assert response.world.name == loaded[0].name == "hover"
     for source, code in (
@@ -233,15 +235,15 @@ def test_loading_is_the_owners_business(simulate, flat_data):
         ({}, NO_RESOURCE),
         ({"resource_string": "<sdf/>"}, 101),
     ):
-        assert code_of(ask(simulation, "/load_world", world_resource=source)) == code
+        assert code_of(call_service(simulation, "/load_world", world_resource=source)) == code
     assert len(loaded) == 1
-    assert code_of(ask(simulation, "/unload_world")) == OK
+    assert code_of(call_service(simulation, "/unload_world")) == OK
     assert loaded[1] is None
 
     def refuse(name):
         raise CommandError(f"no memory for {name}")
 
-    response = ask(simulate(flat_data, on_load=refuse), "/load_world", **wanted)
+    response = call_service(simulate(flat_data, on_load=refuse), "/load_world", **wanted)
     assert code_of(response) == FAILED
     assert "no memory" in response.result.error_message
 
@@ -249,15 +251,15 @@ def test_loading_is_the_owners_business(simulate, flat_data):
 def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
     simulation = simulate(flat_data)
     session = simulation.gateway.open("client")
-    answers = []
+    responses = []
     simulation.clock.pause()
     with InThread(simulation, 5.0):
         from volery.graph.service_reply import ServiceReply
 
         request = message_type("simulation_interfaces/srv/StepSimulation_Request")(steps=3)
-        session.call("/step_simulation", request, ServiceReply(answers.append, answers.append))
-        wait_for(lambda: answers)
-        assert code_of(answers[0]) == OK
+        session.call("/step_simulation", request, ServiceReply(responses.append, responses.append))
+        wait_for(lambda: responses)
+        assert code_of(responses[0]) == OK
         assert simulation.time_ns == 3_000_000
         time.sleep(0.05)
         assert simulation.time_ns == 3_000_000

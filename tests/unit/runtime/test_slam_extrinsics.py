@@ -1,4 +1,4 @@
-"""`volery slam` on a log of a flight: it finds where the LIDARs sit and where it began, or asks."""
+"""`volery slam` on a log: it finds the mounts of the LIDARs and the initial pose, or asks."""
 
 import json
 import math
@@ -34,8 +34,8 @@ STANDS_M = 0.12
 """Height of the body of an F450 on its feet."""
 LEVEL_FRAME, NODDING_FRAME = "uav1/laser_horizontal", "uav1/laser_nodding"
 SENSORS = [
-    {"kind": "lidar", "name": name, "model": "utm_30lx", "position_m": place.tolist()}
-    for name, place in (("horizontal", LEVEL), ("nodding", NODDING))
+    {"kind": "lidar", "name": name, "model": "utm_30lx", "position_m": position.tolist()}
+    for name, position in (("horizontal", LEVEL), ("nodding", NODDING))
 ]
 CONTENT = {
     "name": "woods",
@@ -46,9 +46,9 @@ CONTENT = {
 ORIGIN = {"name": "woods", "seed": 1, "version": "0", "folder": None, "content": CONTENT}
 
 
-def joint(time_ns, parent, child, place, nod=0.0):
+def joint(time_ns, parent, child, position, nod=0.0):
     turn = Quaternion(0.0, math.sin(0.5 * nod), 0.0, math.cos(0.5 * nod))
-    moved = Transform(Vector3(*map(float, place)), turn)
+    moved = Transform(Vector3(*map(float, position)), turn)
     return TransformStamped(header(time_ns, parent), child, moved)
 
 
@@ -58,51 +58,51 @@ def own_motion(time_ns):
 
 
 class Flown:
-    """A recorded flight, what its own SLAM said meanwhile, and what tells of the mounts."""
+    """A recorded flight, what its own SLAM published, and the messages that contain the mounts."""
 
     def __init__(self):
-        self.told = messages(Flight(), trunks(), SECONDS)
-        for _, topic, message in self.told:
+        self.flight_messages = messages(Flight(), trunks(), SECONDS)
+        for _, topic, message in self.flight_messages:
             if topic.startswith("laser"):
                 is_level = "horizontal" in topic
                 message.header.frame_id = LEVEL_FRAME if is_level else NODDING_FRAME
         bench = NodeBench()
         mounts = {"level_mount": LEVEL.tolist(), "nodding_mount": NODDING.tolist()}
         bench.start(Slam, **mounts)
-        said = bench.listen("/uav1/slam/odom")
-        for when, topic, message in self.told:
+        published = bench.listen("/uav1/slam/odom")
+        for when, topic, message in self.flight_messages:
             bench.run_to(max(when, bench.now_ns))
             bench.send(f"/uav1/{topic}", message)
-        places = [m.pose.pose.position for m in said]
+        positions = [m.pose.pose.position for m in published]
         self.own = np.array(
-            [(stamp_of(m) / S, p.x, p.y, p.z) for m, p in zip(said, places, strict=True)]
+            [(stamp_of(m) / S, p.x, p.y, p.z) for m, p in zip(published, positions, strict=True)]
         )
 
-    def write(self, path, *, tells, others=(), truth=None, later_s=0.0):
-        """A log in which `/tf_static`, `/tf`, the scenario or nothing tells of the nodding one."""
+    def write(self, path, *, holder, others=(), truth=None, later_s=0.0):
+        """A log in which `/tf_static`, `/tf`, the scenario or nothing holds the nodding mount."""
         with closing(create_log(path)) as log:
 
             def put(topic, when, message):
                 log.write(Published(topic, message.__msgtype__, when, message))
 
-            if tells == "scenario":
+            if holder == "scenario":
                 put("/volery/scenario", 0, String(json.dumps(ORIGIN)))
             if truth is not None:
                 put("/uav1/ground_truth/odom", 0, truth)
             fixed = [joint(0, "uav1/base_link", LEVEL_FRAME, LEVEL)]
-            if tells == "static":
+            if holder == "static":
                 half = 0.5 * NODDING
                 fixed.append(joint(0, "uav1/base_link", "uav1/bracket", half))
                 fixed.append(joint(0, "uav1/bracket", NODDING_FRAME, half))
-            if tells == "bracket":
+            if holder == "bracket":
                 fixed.append(joint(0, "uav1/bracket", NODDING_FRAME, (0.0, 0.0, 0.0)))
             put("/tf_static", 0, TFMessage(fixed))
             for name in others:
-                put(f"/{name}/laser/horizontal/scan", 0, self.told[-1][2])
-            for when, topic, message in self.told:
+                put(f"/{name}/laser/horizontal/scan", 0, self.flight_messages[-1][2])
+            for when, topic, message in self.flight_messages:
                 if topic == "joint_states":
                     moving = [own_motion(when)]
-                    child = {"moving": NODDING_FRAME, "bracket": "uav1/bracket"}.get(tells)
+                    child = {"moving": NODDING_FRAME, "bracket": "uav1/bracket"}.get(holder)
                     if child is not None:
                         nod = nod_angle(when / S)[0]
                         moving.append(joint(when, "uav1/base_link", child, NODDING, nod))
@@ -119,9 +119,9 @@ def slam(log, out, *more):
     return CliRunner().invoke(app, ["slam", str(log), "--out", str(out), *more])
 
 
-@pytest.mark.parametrize("tells", ["static", "moving", "bracket", "scenario"])
-def test_a_log_gives_the_way_that_its_own_slam_told(tells, flown, tmp_path):
-    flown.write(tmp_path / "flight.mcap", tells=tells)
+@pytest.mark.parametrize("holder", ["static", "moving", "bracket", "scenario"])
+def test_a_log_gives_the_trajectory_that_its_own_slam_published(holder, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", holder=holder)
     result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--initial-pose", "0,0,0,0")
     assert result.exit_code == 0, result.output
     assert "--initial-pose overrides it" not in result.output
@@ -150,27 +150,27 @@ def truth(frame="map"):
     ],
     ids=["scenario", "truth", "odometry by that name", "recorded from later on"],
 )
-def test_it_begins_where_a_log_of_volerys_tells(more, begins, flown, tmp_path):
-    flown.write(tmp_path / "flight.mcap", tells="scenario", **more)
+def test_it_begins_at_the_pose_in_a_log_of_volerys(more, begins, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", holder="scenario", **more)
     result = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert ("from the log; --initial-pose overrides it" in result.output) == any(begins)
-    told = json.loads((tmp_path / "out" / "summary.json").read_text())["start"]
-    np.testing.assert_allclose(told, begins, atol=0.02)
+    start = json.loads((tmp_path / "out" / "summary.json").read_text())["start"]
+    np.testing.assert_allclose(start, begins, atol=0.02)
     path = np.loadtxt(tmp_path / "out" / "path.tum")[:, 1:4]
     np.testing.assert_allclose(path[0], begins[:3], atol=0.05)
-    way = path[-1] - path[0]
-    assert (way[1] > 5.0 * abs(way[0])) == any(begins)  # it flew along its own nose
+    delta = path[-1] - path[0]
+    assert (delta[1] > 5.0 * abs(delta[0])) == any(begins)  # it flew along its own nose
 
 
 def test_a_log_of_a_scenario_that_cannot_be_built_begins_at_the_origin(tmp_path, flown):
-    flown.write(tmp_path / "flight.mcap", tells="scenario")
+    flown.write(tmp_path / "flight.mcap", holder="scenario")
     lost = {**ORIGIN, "folder": str(tmp_path / "gone")}
     lost["content"] = {**CONTENT, "world": {"terrain": {"kind": "grid", "file": "no.csv"}}}
     with closing(create_log(tmp_path / "lost.mcap")) as log:
         text = String(json.dumps(lost))
         log.write(Published("/volery/scenario", text.__msgtype__, 0, text))
-        for _, topic, message in flown.told[:50]:
+        for _, topic, message in flown.flight_messages[:50]:
             log.write(Published(f"/uav1/{topic}", message.__msgtype__, 0, message))
     source = open_source(tmp_path / "lost.mcap")
     assert beginning_of(source, "uav1", "/uav1/laser/horizontal/scan") is None
@@ -179,19 +179,19 @@ def test_a_log_of_a_scenario_that_cannot_be_built_begins_at_the_origin(tmp_path,
     assert beginning_of(whole, "uav2", "/uav1/laser/horizontal/scan") is None
 
 
-def test_a_mount_that_nothing_tells_is_asked_for(flown, tmp_path):
-    flown.write(tmp_path / "flight.mcap", tells="nothing")
+def test_a_mount_that_is_not_in_the_log_is_asked_for(flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", holder="nothing")
     refused = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert refused.exit_code == 2
     assert f"the log has no transform from {NODDING_FRAME}" in refused.output
     assert "--nodding-mount" in refused.output
     assert not (tmp_path / "out").exists()
-    told = slam(tmp_path / "flight.mcap", tmp_path / "out", "--nodding-mount", "0.1,0,-0.08")
-    assert told.exit_code == 0, told.output
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--nodding-mount", "0.1,0,-0.08")
+    assert result.exit_code == 0, result.output
 
 
 def test_of_several_uavs_it_says_which_one_it_maps(flown, tmp_path):
-    flown.write(tmp_path / "flight.mcap", tells="moving", others=("uav2", "uav3"))
+    flown.write(tmp_path / "flight.mcap", holder="moving", others=("uav2", "uav3"))
     result = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "warning: mapping uav1; the log also has uav2, uav3: select with --uav" in result.output
@@ -204,12 +204,12 @@ def test_of_several_uavs_it_says_which_one_it_maps(flown, tmp_path):
     assert "warning: " not in asked.output
 
 
-@pytest.mark.parametrize(("length", "told"), [(5, "in its first 5 bytes"), (100, "cut off")])
-def test_a_log_that_was_cut_off_at_its_beginning_says_so(length, told, flown, tmp_path):
-    flown.write(tmp_path / "flight.mcap", tells="moving")
+@pytest.mark.parametrize(("length", "message"), [(5, "in its first 5 bytes"), (100, "cut off")])
+def test_a_log_that_was_cut_off_at_its_beginning_says_so(length, message, flown, tmp_path):
+    flown.write(tmp_path / "flight.mcap", holder="moving")
     log = tmp_path / "short.mcap"
     log.write_bytes((tmp_path / "flight.mcap").read_bytes()[:length])
     result = slam(log, tmp_path / "out")
     assert result.exit_code == 2
     assert "cut off" in result.output
-    assert told in result.output
+    assert message in result.output

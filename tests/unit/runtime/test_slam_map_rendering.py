@@ -21,16 +21,18 @@ S = 1_000_000_000
 def flown() -> SlamResult:
     """Five seconds beside a trunk and a crown, towards a slope that the level scan meets."""
     times = np.arange(1, 101) * (S // 20)
-    places = np.stack([np.zeros(100), 0.5 * np.sin(0.1 * np.arange(100)), np.full(100, HEIGHT_M)])
+    positions = np.stack(
+        [np.zeros(100), 0.5 * np.sin(0.1 * np.arange(100)), np.full(100, HEIGHT_M)]
+    )
     angles = 0.8 * np.sin(0.3 * np.arange(100))
     level, nodding = [], []
-    for k, (place, angle) in enumerate(zip(places.T, angles, strict=True)):
+    for k, (position, angle) in enumerate(zip(positions.T, angles, strict=True)):
         when = int(times[k])
-        level.append((k, scan_message("level", when, seen_from(place, 0.0))))
-        nodding.append((k, scan_message("laser_nodding", when, seen_from(place, angle))))
+        level.append((k, scan_message("level", when, seen_from(position, 0.0))))
+        nodding.append((k, scan_message("laser_nodding", when, seen_from(position, angle))))
     return SlamResult(
         TopicSelection("uav1", {}, True),
-        EstimatedTrajectory(times, times, places.T, np.tile(rotations.IDENTITY, (100, 1))),
+        EstimatedTrajectory(times, times, positions.T, np.tile(rotations.IDENTITY, (100, 1))),
         [scan for scan in level if scan[0] % 10 == 0],
         lambda _: LEVEL,
         100, 5.0, 0.1, {}, nodding=nodding, nods=np.stack([times / S, angles], 1),

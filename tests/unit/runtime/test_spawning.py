@@ -88,7 +88,7 @@ def test_others_do_not_notice(simulate, mixed, deleted):
     assert changing.vehicles.names[-1] == "later"
 
 
-def test_who_flies_a_trajectory_flies_on(simulate, flat_data):
+def test_a_uav_on_a_trajectory_flies_on(simulate, flat_data):
     def end(change):
         simulation = simulate(flat_data)
         uav = simulation.uavs["uav1"]
@@ -112,15 +112,15 @@ def test_who_flies_a_trajectory_flies_on(simulate, flat_data):
 def test_a_new_one_stands_measures_and_flies(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.5)
-    heard = []
+    received = []
     uav = simulation.vehicles.spawn("extra", "f450", [12.0, 3.0, 0.0])
-    simulation.graph.subscribe("/extra/imu", heard.append)
+    simulation.graph.subscribe("/extra/imu", received.append)
     transforms = []
     simulation.graph.subscribe("/tf_static", transforms.append)
     assert uav.mode is FlightMode.LANDED
     assert simulation.uavs["extra"] is uav
     simulation.run(0.1)
-    assert len(heard) == 20
+    assert len(received) == 20
     children = {t.child_frame_id for t in transforms[-1].message.transforms}
     assert {"extra/imu", "uav1/imu"} <= children
     simulation.graph.call("/extra/take_off")
@@ -153,7 +153,7 @@ def test_any_airframe_comes_with_the_usual_sensors(simulate, flat_data):
 
 
 def test_newcomers_are_seen_and_met(simulate, flat_data):
-    """A LIDAR sees who was spawned before it, and a fall on it is a collision."""
+    """A LIDAR sees a UAV that was spawned before it, and a fall on it is a collision."""
     flat_data["types"]["f450"]["sensors"] = [{"kind": "lidar", "noise": False}]
     simulation = simulate(flat_data)
     scans = []
@@ -207,18 +207,18 @@ def test_nodes_begin_and_end_with_their_uav(simulate, wood_data):
     simulation.vehicles.spawn("third", other.type_name, room)
     own = [node for node in simulation.vehicles.nodes if node.get_namespace() == "/third"]
     assert len(own) == nodes // 2
-    heard = []
-    simulation.graph.subscribe("/third/gap_following/phase", heard.append)
+    received = []
+    simulation.graph.subscribe("/third/gap_following/phase", received.append)
     simulation.run(1.0)
-    assert heard
+    assert received
     simulation.vehicles.delete("third")
-    heard.clear()
+    received.clear()
     simulation.run(1.0)
-    assert not heard
+    assert not received
     assert len(simulation.vehicles.nodes) == nodes
 
 
-def test_faults_find_their_uav_or_nobody(simulate, flat_data):
+def test_faults_find_their_uav_or_none(simulate, flat_data):
     flat_data["uavs"] += [
         {"type": "f450", "position_m": [20.0, 0.0]},
         {"type": "f450", "position_m": [40.0, 0.0]},
@@ -346,7 +346,7 @@ def test_names_and_types_that_cannot_be(simulate, flat_data, name, kind, fault):
 
 
 @pytest.mark.parametrize(
-    ("place", "says"),
+    ("position", "says"),
     [
         ([0.0, 0.0, 0.2], "overlaps uav1"),
         ([9e3, 0.0, 0.0], "beyond the terrain"),
@@ -355,10 +355,10 @@ def test_names_and_types_that_cannot_be(simulate, flat_data, name, kind, fault):
         ([0.0, 0.0], "three finite numbers"),
     ],
 )
-def test_places_that_cannot_be(simulate, flat_data, place, says):
+def test_invalid_spawn_positions(simulate, flat_data, position, says):
     simulation = simulate(flat_data)
     with pytest.raises(PlacementError, match=says):
-        simulation.vehicles.spawn("extra", "f450", place)
+        simulation.vehicles.spawn("extra", "f450", position)
     assert simulation.vehicles.names == ("uav1",)
 
 

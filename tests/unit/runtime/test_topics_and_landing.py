@@ -1,4 +1,4 @@
-"""A landing that was asked for is not undone by who still publishes velocities."""
+"""A requested landing is not undone by a client that still publishes velocities."""
 
 import pytest
 

@@ -92,7 +92,7 @@ def test_samples_equal_the_messages_of_the_topics(simulate, all_data):
     scan = sensors["horizontal"].latest
     np.testing.assert_array_equal(scan.ranges, seen["laser/horizontal/scan"].ranges)
     assert sensors["imu"].latest.specific_force[0] == seen["imu"].linear_acceleration.x
-    assert not sensors["front"].has_sample  # nobody has requested all parts yet
+    assert not sensors["front"].has_sample  # no caller has requested all parts yet
     with pytest.raises(SensorError, match=r"'front' of uav2 has no sample yet: it renders from"):
         _ = sensors["front"].latest
     simulation.run(0.1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from service_calls import ask
+from service_calls import call_service
 
 from volery.core.errors import CommandError
 from volery.graph.messages import (
@@ -36,37 +36,37 @@ def fly(simulation, velocity, uav="uav2"):
 
 
 def test_arming_says_what_it_is(pair):
-    standing = ask(pair, "/uav1/arm")
+    standing = call_service(pair, "/uav1/arm")
     assert standing.success
     assert "take_off" in standing.message
-    flying = ask(pair, "/uav2/arm")
+    flying = call_service(pair, "/uav2/arm")
     assert flying.success
     assert "flies" in flying.message
     pair._engine.fleet.crash(1)
-    wrecked = ask(pair, "/uav2/arm")
+    wrecked = call_service(pair, "/uav2/arm")
     assert not wrecked.success
     assert "crashed" in wrecked.message
 
 
 def test_disarming_lets_nothing_fall(pair):
-    assert ask(pair, "/uav1/disarm").success
-    response = ask(pair, "/uav2/disarm")
+    assert call_service(pair, "/uav1/disarm").success
+    response = call_service(pair, "/uav2/disarm")
     assert not response.success
     assert "kill" in response.message
 
 
 def test_take_off_to_a_height(pair):
-    assert ask(pair, "/uav1/take_off_to", altitude=4.0).success
+    assert call_service(pair, "/uav1/take_off_to", altitude=4.0).success
     pair.run(6.0)
     assert pair.uavs["uav1"].position_map[2] == pytest.approx(4.1, abs=0.3)
-    again = ask(pair, "/uav1/take_off_to", altitude=4.0)
+    again = call_service(pair, "/uav1/take_off_to", altitude=4.0)
     assert not again.success
     assert "is flying" in again.message
 
 
 @pytest.mark.parametrize("altitude", [0.0, -1.0, float("nan"), 1e9])
 def test_heights_that_are_none(pair, altitude):
-    response = ask(pair, "/uav1/take_off_to", altitude=altitude)
+    response = call_service(pair, "/uav1/take_off_to", altitude=altitude)
     assert not response.success
     assert response.message
     assert pair.uavs["uav1"].mode.name == "LANDED"
@@ -75,27 +75,27 @@ def test_heights_that_are_none(pair, altitude):
 def test_plain_services_stay_triggers(pair):
     for name in ("take_off", "hold", "land", "return_home"):
         assert pair.graph.services()[f"/uav1/{name}"] == "std_srvs/srv/Trigger"
-    assert not ask(pair, "/uav1/land").success
-    assert ask(pair, "/uav1/take_off").success
-    assert ask(pair, "/uav2/return_home").success
+    assert not call_service(pair, "/uav1/land").success
+    assert call_service(pair, "/uav1/take_off").success
+    assert call_service(pair, "/uav2/return_home").success
 
 
 def test_go_to(pair):
-    where = {"x": 22.0, "y": 1.0, "z": 6.0}
-    assert ask(pair, "/uav2/go_to", position=where, yaw=1.0).success
+    goal = {"x": 22.0, "y": 1.0, "z": 6.0}
+    assert call_service(pair, "/uav2/go_to", position=goal, yaw=1.0).success
     pair.run(6.0)
     uav = pair.uavs["uav2"]
     assert np.linalg.norm(uav.position_map - [22.0, 1.0, 6.0]) < 0.3
     heading = 2.0 * np.arctan2(uav.attitude[2], uav.attitude[3])
     assert heading == pytest.approx(1.0, abs=0.1)
-    assert ask(pair, "/uav2/go_to", position=where, yaw=9.0, keep_heading=True).success
-    standing = ask(pair, "/uav1/go_to", position=where)
+    assert call_service(pair, "/uav2/go_to", position=goal, yaw=9.0, keep_heading=True).success
+    standing = call_service(pair, "/uav1/go_to", position=goal)
     assert not standing.success
     assert "take off" in standing.message
-    bad = ask(pair, "/uav2/go_to", position={"x": float("nan")})
+    bad = call_service(pair, "/uav2/go_to", position={"x": float("nan")})
     assert not bad.success
-    ask(pair, "/uav1/take_off")
-    assert "takes off" in ask(pair, "/uav1/go_to", position=where).message
+    call_service(pair, "/uav1/take_off")
+    assert "takes off" in call_service(pair, "/uav1/go_to", position=goal).message
 
 
 def goal(position, rotation=(0.0, 0.0, 0.0, 0.0), frame="map"):
@@ -142,7 +142,7 @@ def test_refused_velocity_commands_do_not(pair):
         pair.graph.subscribe(f"/{name}/cmd_vel/applied", applied.append)
     fly(pair, 1.0, "uav1")  # it stands
     fly(pair, float("nan"))
-    ask(pair, "/uav1/take_off")
+    call_service(pair, "/uav1/take_off")
     fly(pair, 1.0, "uav1")  # it takes off
     assert applied == []
     assert pair.uavs["uav1"].mode.name == "TAKE_OFF"
@@ -159,32 +159,32 @@ def test_a_silent_commander_is_not_followed_for_long(pair):
         raise AssertionError("it never held")
 
     holds_after(0.5)
-    assert ask(pair, "/uav2/set_command_timeout", seconds=1.2).success
+    assert call_service(pair, "/uav2/set_command_timeout", seconds=1.2).success
     holds_after(1.2)
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, 61.0, float("nan")])
 def test_time_outs_that_are_none(pair, seconds):
-    response = ask(pair, "/uav2/set_command_timeout", seconds=seconds)
+    response = call_service(pair, "/uav2/set_command_timeout", seconds=seconds)
     assert not response.success
     assert "out of range" in response.message
 
 
-@pytest.mark.parametrize("way", ["service", "post"])
-def test_a_stop_acts_with_the_very_next_physics_step(pair, way):
+@pytest.mark.parametrize("method", ["service", "post"])
+def test_a_stop_acts_with_the_very_next_physics_step(pair, method):
     """However long the run is that it comes into: what is posted comes before the physics."""
     pair.run(0.1005)
     turning = pair.uavs["uav2"].rotor_speed
-    if way == "service":
-        assert ask(pair, "/uav2/kill").success
+    if method == "service":
+        assert call_service(pair, "/uav2/kill").success
     else:
-        pair.post(lambda: ask(pair, "/uav2/kill"))
+        pair.post(lambda: call_service(pair, "/uav2/kill"))
     pair.step()
     once = pair.uavs["uav2"].rotor_speed
     assert (once < turning).all()
     pair.step()
     assert (pair.uavs["uav2"].rotor_speed < once).all()
-    assert ask(pair, "/uav1/kill").success  # its rotors stand still
+    assert call_service(pair, "/uav1/kill").success  # its rotors stand still
 
 
 def test_a_killed_uav_falls_under_a_stream_of_twists_until_it_holds(pair):
@@ -192,13 +192,13 @@ def test_a_killed_uav_falls_under_a_stream_of_twists_until_it_holds(pair):
     session = pair.gateway.open("client")
     session.advertise("/uav2/cmd_vel", "geometry_msgs/msg/Twist")
     height = uav.position_map[2]
-    assert ask(pair, "/uav2/kill").success
+    assert call_service(pair, "/uav2/kill").success
     for _ in range(10):
         session.publish("/uav2/cmd_vel", twist(0.0))
         pair.run(0.05)
     assert uav.rotors_stopped
     assert height - uav.position_map[2] > 0.8  # half a second of free fall, less drag
-    assert ask(pair, "/uav2/hold").success
+    assert call_service(pair, "/uav2/hold").success
     session.publish("/uav2/cmd_vel", twist(0.0))
     pair.run(0.05)
     assert not uav.rotors_stopped
@@ -225,7 +225,7 @@ def test_a_stopped_kinematic_uav_stands_in_the_air(simulate, flat_data):
     simulation = simulate(flat_data)
     fly(simulation, 2.0, "uav1")
     simulation.run(0.3)
-    assert ask(simulation, "/uav1/kill").success
+    assert call_service(simulation, "/uav1/kill").success
     stopped_at = simulation.uavs["uav1"].position_map
     simulation.run(0.2)
     assert np.linalg.norm(simulation.uavs["uav1"].position_map - stopped_at) < 0.01
@@ -271,7 +271,7 @@ def test_applied_commands_are_the_same_in_equal_runs(simulate, flat_data):
 
 @pytest.mark.parametrize("z", [-3.0, 0.0])
 def test_a_goal_below_the_ground_is_refused(pair, z):
-    response = ask(pair, "/uav2/go_to", position={"x": 10.0, "y": 3.0, "z": z})
+    response = call_service(pair, "/uav2/go_to", position={"x": 10.0, "y": 3.0, "z": z})
     assert not response.success
     assert "under the ground" in response.message
     assert "z must be at least 0.1" in response.message
@@ -283,7 +283,7 @@ def test_a_goal_inside_an_obstacle_is_refused(simulate, wood_data):
     wood = simulate(wood_data)
     trunk = wood.world.forest.position_map[0] + [0.0, 0.0, 1.0]
     x, y, z = trunk.tolist()
-    response = ask(wood, "/uav1/go_to", position={"x": x, "y": y, "z": z})
+    response = call_service(wood, "/uav1/go_to", position={"x": x, "y": y, "z": z})
     assert not response.success
     assert "tree" in response.message
     with pytest.raises(CommandError, match=r"the goal .* lies in"):

@@ -1,4 +1,4 @@
-"""What a scenario needs compiled, who compiles it, and that no kernel of a node was forgotten."""
+"""What a scenario needs compiled, where it is compiled, and that no kernel is forgotten."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def named(found: list[tasks.Task]) -> set[str]:
     return {name_of(task).removeprefix("volery.") for task in found}
 
 
-def test_nobody_waits_for_the_kernels_of_nodes_and_cameras_without_them() -> None:
+def test_no_run_waits_for_the_kernels_of_nodes_and_cameras_that_it_lacks() -> None:
     assert needs_of(load_scenario("hover")) == [core_tasks.dynamics, core_tasks.sensing]
 
 
@@ -33,7 +33,7 @@ def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
     assert {"runtime.warmup.core_tasks:images", "runtime.warmup.core_tasks:estimates"} <= found
     assert {
         "autonomy.slam.warmup:motion",
-        "autonomy.slam.warmup:known_places",
+        "autonomy.slam.warmup:loop_closure",
         "autonomy.planning.warmup:plans",
         "autonomy.search.warmup:colours",
     } <= found
@@ -105,7 +105,7 @@ class Names(Node):
 """
 
 
-def test_a_users_warm_up_that_fails_is_told_of(
+def test_a_users_warmup_that_fails_is_reported(
     flat_data: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "broken_warm_ups.py").write_text(BROKEN)
@@ -164,7 +164,7 @@ print(first, counting.count, sum(1 for _ in cache_dir().rglob("*.nbc")))
 
 @pytest.mark.parametrize("helper", ["helped", "alone"])
 def test_two_processes_compile_and_one_where_the_other_fails(tmp_path: Path, helper: str) -> None:
-    first, then, kept = map(int, told(SHARED, helper, cache=tmp_path).split())
+    first, then, kept = map(int, output_of(SHARED, helper, cache=tmp_path).split())
     assert first == then  # what the helper compiled is read from the cache
     assert kept == 2
     if helper == "alone":
@@ -191,7 +191,7 @@ for module in pkgutil.walk_packages(volery.autonomy.__path__, "volery.autonomy."
 
 
 def test_all_kernels_that_nodes_call_are_compiled_by_a_warm_up() -> None:
-    assert told(UNCALLED) == "", (
+    assert output_of(UNCALLED) == "", (
         "of a node that calls these, `warmup_tasks` names nothing that does"
     )
 
@@ -209,7 +209,7 @@ def test_a_plain_node_needs_nothing() -> None:
     assert seeing.scan_points in all_needs()
 
 
-def told(script: str, *words: str, cache: Path | None = None) -> str:
+def output_of(script: str, *words: str, cache: Path | None = None) -> str:
     own = {} if cache is None else {"VOLERY_CACHE_DIR": str(cache)}
     done = subprocess.run(
         [sys.executable, "-c", script, *words],

@@ -1,10 +1,10 @@
-"""Rain, snow, fog, dust and hour: set in scenarios and while running, told, kept, played back."""
+"""Rain, snow, fog, dust and hour: set at the start and in flight, published, saved, played back."""
 
 import math
 
 import numpy as np
 import pytest
-from service_calls import ask
+from service_calls import call_service
 
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import ScenarioError
@@ -28,9 +28,9 @@ def seeing_data(flat_data):
 
 
 def listen(simulation, topic):
-    heard = []
-    simulation.graph.subscribe(topic, lambda published: heard.append(published.message))
-    return heard
+    received = []
+    simulation.graph.subscribe(topic, lambda published: received.append(published.message))
+    return received
 
 
 def test_a_scenario_has_weather_and_hour(simulate, flat_data):
@@ -57,23 +57,29 @@ def test_what_cannot_be_is_refused(flat_data, world, words):
 
 def test_services_set_some_fields_or_all(simulate, flat_data):
     simulation = simulate(flat_data)
-    ask(simulation, "/volery/set_weather", wind={"x": 3.0}, w20=5.0)
-    some = ask(
+    call_service(simulation, "/volery/set_weather", wind={"x": 3.0}, w20=5.0)
+    some = call_service(
         simulation, "/volery/set_weather", only=["rain", "hour_of_day"], rain=8.0, hour_of_day=12.0
     )
     assert some.success
     assert simulation.world.weather.velocity_map == (3.0, 0.0, 0.0)
-    told = ask(simulation, "/volery/get_weather")
-    assert (told.wind.x, told.w20, told.rain, told.snow, told.hour_of_day) == (3, 5, 8, 0, 12)
+    response = call_service(simulation, "/volery/get_weather")
+    assert (response.wind.x, response.w20, response.rain, response.snow, response.hour_of_day) == (
+        3,
+        5,
+        8,
+        0,
+        12,
+    )
     visibility = 1 / (1 / 20e3 + 1 / simulation.world.weather.particles.visibility_m)
-    assert told.visibility == pytest.approx(visibility)
-    assert told.sun_elevation == pytest.approx(math.radians(90 - 47.4 + 23.44), abs=0.005)
-    assert told.sun_azimuth == pytest.approx(math.pi, abs=0.05)
-    assert ask(simulation, "/volery/set_weather", fog_visibility=80.0).success
+    assert response.visibility == pytest.approx(visibility)
+    assert response.sun_elevation == pytest.approx(math.radians(90 - 47.4 + 23.44), abs=0.005)
+    assert response.sun_azimuth == pytest.approx(math.pi, abs=0.05)
+    assert call_service(simulation, "/volery/set_weather", fog_visibility=80.0).success
     assert simulation.world.weather.particles == Particles(fog_visibility_m=80.0)
     assert simulation.world.weather.velocity_map == (0.0, 0.0, 0.0)
     assert simulation.world.weather.hour_of_day == 12.0
-    assert ask(simulation, "/volery/set_weather").success
+    assert call_service(simulation, "/volery/set_weather").success
     assert simulation.world.weather.particles == CLEAR_AIR
 
 
@@ -86,40 +92,40 @@ def test_services_refuse_what_cannot_be(simulate, flat_data):
         ({"hour_of_day": 30.0}, "hour_of_day"),
         ({"only": ["hail"]}, "known: wind"),
     ):
-        response = ask(simulation, "/volery/set_weather", **fields)
+        response = call_service(simulation, "/volery/set_weather", **fields)
         assert not response.success
         assert word in response.message
     assert simulation.world.weather.particles == CLEAR_AIR
 
 
-def test_the_weather_is_told_at_once_and_at_each_change(simulate, flat_data):
+def test_the_weather_is_published_at_once_and_at_each_change(simulate, flat_data):
     flat_data["world"] = {"weather": WET}
     simulation = simulate(flat_data)
     simulation.run(0.1)
-    heard = listen(simulation, "/weather")  # late: it is latched
+    received = listen(simulation, "/weather")  # late: it is latched
     simulation.run(0.1)
-    (first,) = heard
+    (first,) = received
     assert (first.rain, first.fog_visibility, first.profile) == (12.0, 150.0, "uniform")
-    ask(simulation, "/volery/set_weather", snow=2.0)
-    ask(simulation, "/volery/gust", amplitude={"x": 5.0}, rise=0.5)
+    call_service(simulation, "/volery/set_weather", snow=2.0)
+    call_service(simulation, "/volery/gust", amplitude={"x": 5.0}, rise=0.5)
     simulation.run(0.01)
-    _, snowy, gusty = heard
+    _, snowy, gusty = received
     assert (snowy.rain, snowy.snow, list(snowy.gusts)) == (0.0, 2.0, [])
     assert snowy.header.stamp.nanosec == 200_000_000
     (gust,) = gusty.gusts
     assert (gust.amplitude.x, gust.start, gust.rise, gust.end) == (5.0, 0.2, 0.5, 0.0)
 
 
-def test_what_is_told_can_be_commanded(simulate, flat_data):
-    """`/weather_command` takes what `/weather` told, gusts included, and nothing that cannot be."""
+def test_what_is_published_can_be_commanded(simulate, flat_data):
+    """`/weather_command` accepts all of `/weather`, gusts included, and nothing that cannot be."""
     one, other = simulate(flat_data), simulate(flat_data)
-    heard = listen(one, "/weather")
+    received = listen(one, "/weather")
     wet = {"rain": 5.0, "dust_visibility": 90.0, "hour_of_day": 24.0}
-    ask(one, "/volery/set_weather", wind={"y": 2.0}, **wet)
-    ask(one, "/volery/gust", amplitude={"x": 5.0}, rise=0.5, duration=3.0)
+    call_service(one, "/volery/set_weather", wind={"y": 2.0}, **wet)
+    call_service(one, "/volery/gust", amplitude={"x": 5.0}, rise=0.5, duration=3.0)
     one.run(0.01)
     command = other.graph.advertise("/weather_command", "volery_interfaces/msg/Weather")
-    command.publish(heard[-1])
+    command.publish(received[-1])
     other.run(0.01)
     assert other.world.weather == one.world.weather
     broken = zero_message("volery_interfaces/msg/Weather")
@@ -139,16 +145,18 @@ def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
 
     def flown(simulation):
         clouds = listen(simulation, "/uav1/points")
-        pictures = listen(simulation, "/uav1/camera/image_raw")
+        images = listen(simulation, "/uav1/camera/image_raw")
         simulation.run(0.5)
-        return clouds, pictures, simulation.uavs["uav1"].position_map
+        return clouds, images, simulation.uavs["uav1"].position_map
 
     first = simulate(seeing_data, recordings=tmp_path)
-    ask(first, "/volery/start_recording", path="weather.mcap")
+    call_service(first, "/volery/start_recording", path="weather.mcap")
     first.run(0.25)
-    ask(first, "/volery/set_weather", wind={"x": 6.0}, w20=8.0, fog_visibility=40.0, snow=2.0)
-    clouds, pictures, place = flown(first)
-    ask(first, "/volery/stop_recording")
+    call_service(
+        first, "/volery/set_weather", wind={"x": 6.0}, w20=8.0, fog_visibility=40.0, snow=2.0
+    )
+    clouds, images, position = flown(first)
+    call_service(first, "/volery/stop_recording")
 
     again = simulate(seeing_data)
     again.replay_log(
@@ -157,10 +165,10 @@ def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
         )
     )
     again.run(0.25)
-    clouds_again, pictures_again, place_again = flown(again)
+    clouds_again, images_again, position_again = flown(again)
     assert again.world.weather == first.world.weather
-    np.testing.assert_array_equal(place_again, place)
-    for one, other in ((clouds, clouds_again), (pictures, pictures_again)):
+    np.testing.assert_array_equal(position_again, position)
+    for one, other in ((clouds, clouds_again), (images, images_again)):
         assert len(one) >= 4
         assert [bytes(m.data) for m in one] == [bytes(m.data) for m in other]
 
@@ -168,27 +176,27 @@ def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
 def test_sensors_see_a_change_at_once_and_a_restore_takes_it_back(simulate, seeing_data):
     simulation = simulate(seeing_data)
     clouds = listen(simulation, "/uav1/points")
-    pictures = listen(simulation, "/uav1/camera/image_raw")
+    images = listen(simulation, "/uav1/camera/image_raw")
     simulation.run(0.3)
     clear = simulation.snapshot()
     simulation.run(0.3)
-    seen = [bytes(m.data) for m in clouds], [bytes(m.data) for m in pictures]
+    seen = [bytes(m.data) for m in clouds], [bytes(m.data) for m in images]
     simulation.restore(clear)
-    ask(simulation, "/volery/set_weather", fog_visibility=30.0)
+    call_service(simulation, "/volery/set_weather", fog_visibility=30.0)
     clouds.clear()
-    pictures.clear()
+    images.clear()
     simulation.run(0.3)
     foggy = simulation.snapshot()
     hidden = [bytes(m.data) for m in clouds]
     assert all(a != b for a, b in zip(seen[0][-len(hidden) :], hidden, strict=True))
-    assert np.asarray(pictures[-1].data).std() < 0.5 * np.frombuffer(seen[1][-1], np.uint8).std()
+    assert np.asarray(images[-1].data).std() < 0.5 * np.frombuffer(seen[1][-1], np.uint8).std()
     simulation.restore(clear)
     assert simulation.world.weather.particles == CLEAR_AIR
     clouds.clear()
-    pictures.clear()
+    images.clear()
     simulation.run(0.3)
     assert [bytes(m.data) for m in clouds] == seen[0][-len(clouds) :]
-    assert [bytes(m.data) for m in pictures] == seen[1][-len(pictures) :]
+    assert [bytes(m.data) for m in images] == seen[1][-len(images) :]
     simulation.restore(foggy)
     assert simulation.world.weather.particles == Particles(fog_visibility_m=30.0)
     simulation.reset()

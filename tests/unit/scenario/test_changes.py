@@ -140,7 +140,7 @@ def test_the_density_of_a_procedural_forest(wood_data):
         apply(parse_scenario(wood_data), Changes(tree_density_per_ha=1e7))
 
 
-def test_a_share_of_an_inventory():
+def test_a_fraction_of_an_inventory():
     scenario = load_scenario("longleaf")
     assert apply(scenario, Changes(tree_share=0.25)).world.forest.fraction == 0.25
     with pytest.raises(ScenarioError, match="use 'tree_share'"):

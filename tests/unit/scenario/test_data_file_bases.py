@@ -103,7 +103,7 @@ def test_airframes_of_one_name_keep_their_own_bodies(write):
     assert scene.bodies[0] is not scene.bodies[1]
 
 
-def test_wrong_keys_are_told_with_the_files_that_they_may_be_in(write):
+def test_wrong_keys_are_reported_with_the_files_that_they_may_be_in(write):
     write("mid.toml", 'base = "vlp_16"\n[range]\nmax_m = 50.0\n')
     path = write("top.toml", 'base = "mid.toml"\n[range]\nmaximum_m = 60.0\n')
     assert refusal(path).startswith(

@@ -1,4 +1,4 @@
-"""Schemas refuse numbers that no real thing has, and accept those that real things have."""
+"""Schemas refuse numbers that no real object has, and accept those that real objects have."""
 
 import pytest
 from pydantic import BaseModel

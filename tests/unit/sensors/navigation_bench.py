@@ -22,7 +22,7 @@ def fleet_of(count=1, position=(0.0, 0.0, 10.0), attitude=LEVEL):
 
 
 def put(fleet, position, attitude=LEVEL):
-    """Let all UAVs have stood at a place for ever."""
+    """Let all UAVs have stood at a position for ever."""
     fleet.state.position_map[:] = position
     fleet.state.attitude[:] = attitude
     fleet.history.position[:] = position

@@ -49,12 +49,12 @@ def test_pressure_is_felt_where_the_sensor_sits():
 def test_barometer_noise_and_drift():
     model, fleet = BarometerModel.load("barometer_px4"), fleet_of()
     bank, truth = barometers(4000, noise=True), barometers().sample(0, 0, fleet).pressure[0]
-    readings = [bank.sample(k, 0, fleet) for k in range(40)]
-    error = np.array([r.pressure for r in readings]) - truth
+    samples = [bank.sample(k, 0, fleet) for k in range(40)]
+    error = np.array([r.pressure for r in samples]) - truth
     assert error[0].std() == pytest.approx(math.hypot(model.drift_pa, model.noise_pa), rel=0.05)
     # Neighbours share the drift: half the variance of their difference is the white noise's.
     assert np.diff(error, axis=0).std() / math.sqrt(2.0) == pytest.approx(model.noise_pa, rel=0.02)
-    assert readings[0].pressure_variance == model.noise_pa**2
+    assert samples[0].pressure_variance == model.noise_pa**2
 
 
 def test_barometer_drift_forgets_in_its_correlation_time():
@@ -114,11 +114,11 @@ def test_iron_distorts():
 def test_magnetometer_noise_and_walk():
     model, fleet, seconds = MagnetometerModel.load("magnetometer_px4"), fleet_of(), 4
     bank = magnetometers(2000, noise=True)
-    readings = [bank.sample(k, 0, fleet) for k in range(100 * seconds)]
+    samples = [bank.sample(k, 0, fleet) for k in range(100 * seconds)]
     white = model.noise_density_t_sqrt_hz * math.sqrt(100.0)
-    error = np.array([r.field for r in readings[:20]]) - FIELD
+    error = np.array([r.field for r in samples[:20]]) - FIELD
     assert error.std() == pytest.approx(white, rel=0.01)
-    assert readings[0].field_variance == pytest.approx(white**2)
+    assert samples[0].field_variance == pytest.approx(white**2)
     walked = bank.get_state()["bias"].std()
     assert walked == pytest.approx(model.random_walk_t_s_sqrt_hz * math.sqrt(seconds), rel=0.05)
 

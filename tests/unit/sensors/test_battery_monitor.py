@@ -17,14 +17,14 @@ def with_monitor(data, **kind):
 
 def test_publishes_battery_states(flat_data, simulate):
     simulation = simulate(with_monitor(flat_data, battery_charge=0.6))
-    heard = []
+    received = []
     simulation.graph.subscribe_all(
-        lambda p: heard.append(p) if p.topic == "/uav1/battery" else None
+        lambda p: received.append(p) if p.topic == "/uav1/battery" else None
     )
     simulation.run(5.0)
-    assert [p.time_ns for p in heard] == [k * 1_000_000_000 for k in range(len(heard))]
-    assert len(heard) >= 5
-    state = heard[-1].message
+    assert [p.time_ns for p in received] == [k * 1_000_000_000 for k in range(len(received))]
+    assert len(received) >= 5
+    state = received[-1].message
     uav = simulation.uavs["uav1"]
     assert state.percentage == pytest.approx(uav.battery_charge, abs=1e-3)
     assert 0.58 < state.percentage < 0.6
@@ -34,7 +34,7 @@ def test_publishes_battery_states(flat_data, simulate):
     assert state.charge == pytest.approx(state.percentage * 5.0)
     assert math.isnan(state.temperature)
     np.testing.assert_allclose(state.cell_voltage, [state.voltage / 4] * 4, rtol=1e-6)
-    assert len(heard[-1].cdr) > 80
+    assert len(received[-1].cdr) > 80
 
 
 def test_low_is_an_event(flat_data, simulate):

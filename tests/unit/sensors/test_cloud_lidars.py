@@ -20,11 +20,11 @@ CLOUDS = ["vlp_16", "hdl_32e", "os1_64", "os1_128", "mid_40"]
 SENSOR = SensorId(0, "uav1", "top")
 
 
-def to_plane(direction, x, reach):
+def to_plane(direction, x, max_range_m):
     """Distances along unit vectors (3, N) from the origin to the wall at x."""
     with np.errstate(divide="ignore"):
         away = np.where(direction[0] > 0, x / direction[0], np.inf)
-    return np.where(away <= reach, away, np.inf)
+    return np.where(away <= max_range_m, away, np.inf)
 
 
 @pytest.mark.parametrize("name", CLOUDS)
@@ -101,9 +101,9 @@ def test_slow_tables_are_exact_too(tmp_path):
 def test_threads_batches_and_the_oracle_agree(name):
     model = load_lidar(name)
     forest, terrain = small_forest(), Terrain.flat(extent_m=20.0)
-    place = np.array([[5.0, 5.0, 2.0], [10.0, 12.0, 3.0], [15.0, 6.0, 1.5]])
+    positions = np.array([[5.0, 5.0, 2.0], [10.0, 12.0, 3.0], [15.0, 6.0, 1.5]])
     yaw = rotations.from_rpy(np.zeros(3), 0.0, np.arange(3.0))
-    history = new_history(place, yaw, DT_NS)
+    history = new_history(positions, yaw, DT_NS)
     mounts = stack_mounts([make_mount(), make_mount([0, 0, 0.1], rotations.from_rpy(0, 0.3, 0))])
     batch = make_batch(np.repeat(np.arange(3), 2), np.tile([0, 1], 3), 0, np.arange(6), 3, mounts)
     results = []

@@ -124,10 +124,10 @@ def test_a_beam_over_an_edge_has_two_echoes():
     assert np.isinf(beam[:, 2]).all()
     # Two echoes share the light: each, over its whole echo, is its share; the shares add up to 1.
     whole = np.array([(2.0 / 5.0) ** 2, (2.0 / 9.0) ** 2]) * 4000.0 * REFLECTIVITY[Material.WALL]
-    share = echoes.intensities[both][:, :2, edge] / whole
-    np.testing.assert_allclose(share.sum(axis=1), 1.0, atol=0.01)
-    assert share[:, 0].max() <= 0.5 + 1e-3
-    assert share[:, 0].min() >= 0.1 - 1e-3
+    fraction = echoes.intensities[both][:, :2, edge] / whole
+    np.testing.assert_allclose(fraction.sum(axis=1), 1.0, atol=0.01)
+    assert fraction[:, 0].max() <= 0.5 + 1e-3
+    assert fraction[:, 0].min() >= 0.1 - 1e-3
     elsewhere = np.delete(echoes.ranges, [edge, edge + 1], axis=2)
     assert np.isinf(elsewhere[:, 1:]).all()
 

@@ -135,7 +135,7 @@ def test_state_and_reset():
 
 
 @pytest.mark.parametrize(
-    ("row", "kind", "value", "said"),
+    ("row", "kind", "value", "message"),
     [
         (3, "stuck", None, "row 3"),
         (-1, "stuck", None, "row -1"),
@@ -150,8 +150,8 @@ def test_state_and_reset():
         (0, "noisy", [1.0, 2.0], "the sigma must be 1 finite numbers for ranges"),
     ],
 )
-def test_wrong_faults_are_refused(row, kind, value, said):
-    with pytest.raises(CommandError, match=said):
+def test_wrong_faults_are_refused(row, kind, value, message):
+    with pytest.raises(CommandError, match=message):
         table().set(row, kind, value)
 
 
@@ -160,7 +160,7 @@ def test_a_bias_of_an_imu_needs_all_its_numbers():
         FaultTable(SENSORS, ImuSamples.MEASURED, KEYS).set(0, "biased", 0.1)
 
 
-def test_who_has_worked_for_long_gets_stuck_and_is_mended_also_after_a_snapshot():
+def test_a_sensor_that_has_worked_for_long_gets_stuck_and_is_repaired_also_after_a_snapshot():
     faults = table()
     for k in range(3):
         faults.apply(ranges(k), k)

@@ -37,7 +37,7 @@ def stamp(message):
     return message.header.stamp.sec * NS + message.header.stamp.nanosec
 
 
-def place(fix):
+def position_of(fix):
     return ZURICH.enu_from_geodetic([*np.radians([fix.latitude, fix.longitude]), fix.altitude])
 
 
@@ -46,7 +46,7 @@ def vector(v):
 
 
 @pytest.mark.parametrize("rate_hz", [200, 500, 1000, 4000])
-def test_a_fix_is_the_place_of_120_ms_ago(simulate, flat_data, rate_hz):
+def test_a_fix_is_the_position_of_120_ms_ago(simulate, flat_data, rate_hz):
     """At the slower rates the history of poses reaches back least, counted in steps."""
     gnss = {"noise": False}
     fixes, velocities, truth = fly(simulate, flat_data, gnss=gnss, rate_hz=rate_hz)
@@ -57,7 +57,7 @@ def test_a_fix_is_the_place_of_120_ms_ago(simulate, flat_data, rate_hz):
         assert stamp(velocity.message) == stamp(fix.message)
         before = true[stamp(fix.message)]
         position = vector(before.pose.pose.position)
-        np.testing.assert_allclose(place(fix.message), position, atol=1e-6)
+        np.testing.assert_allclose(position_of(fix.message), position, atol=1e-6)
         q = before.pose.pose.orientation
         moving = rotations.rotate([q.x, q.y, q.z, q.w], vector(before.twist.twist.linear))
         measured = vector(velocity.message.twist.twist.linear)
@@ -70,13 +70,13 @@ def test_a_fix_is_the_place_of_120_ms_ago(simulate, flat_data, rate_hz):
 def test_instants_between_physics_steps_are_exact(simulate, flat_data):
     fixes, _, truth = fly(simulate, flat_data, gnss={"noise": False, "phase_s": 0.012_345_6})
     times = np.array([stamp(m.message) for m in truth])
-    places = np.array([vector(m.message.pose.pose.position) for m in truth])
+    positions = np.array([vector(m.message.pose.pose.position) for m in truth])
     for k, fix in enumerate(fixes):
         instant = 12_345_600 + k * PERIOD
         assert stamp(fix.message) == instant
         assert fix.time_ns == -(-(instant + 120_000_000) // 1_000_000) * 1_000_000
-        expected = [np.interp(instant, times, axis) for axis in places.T]
-        np.testing.assert_allclose(place(fix.message), expected, atol=1e-6)
+        expected = [np.interp(instant, times, axis) for axis in positions.T]
+        np.testing.assert_allclose(position_of(fix.message), expected, atol=1e-6)
 
 
 def test_antenna_feels_its_lever():
@@ -102,18 +102,18 @@ def test_velocity_is_that_of_the_antenna():
 def test_noise_and_drift_are_as_the_model_says(name):
     model, count, fleet = GnssModel.load(name), 4000, fleet_of()
     bank = gnss_bank(count, noise=True, **model.model_dump())
-    readings = [bank.sample(k, k * PERIOD, fleet) for k in range(61)]
-    error = np.array([r.position_map for r in readings]) - fleet.state.position_map[0]
+    samples = [bank.sample(k, k * PERIOD, fleet) for k in range(61)]
+    error = np.array([r.position_map for r in samples]) - fleet.state.position_map[0]
     sigma = np.array([model.horizontal_drift_m] * 2 + [model.vertical_drift_m])
     for k in (0, 60):  # as spread at the start as later
         np.testing.assert_allclose(error[k].std(axis=0), sigma, rtol=0.04)
     together = (error[0] * error[60]).mean(axis=0) / sigma**2
     np.testing.assert_allclose(together, math.exp(-12.0 / model.drift_correlation_s), atol=0.05)
-    speed = np.array([r.velocity_map for r in readings[:10]])
+    speed = np.array([r.velocity_map for r in samples[:10]])
     noise = [model.horizontal_velocity_noise_m_s] * 2 + [model.vertical_velocity_noise_m_s]
     np.testing.assert_allclose(speed.std(axis=(0, 1)), noise, rtol=0.03)
-    np.testing.assert_allclose(readings[0].position_variance[0], sigma**2, rtol=1e-6)
-    np.testing.assert_allclose(readings[0].velocity_variance[0], np.square(noise))
+    np.testing.assert_allclose(samples[0].position_variance[0], sigma**2, rtol=1e-6)
+    np.testing.assert_allclose(samples[0].velocity_variance[0], np.square(noise))
 
 
 def test_white_noise_of_neighbouring_fixes():
@@ -213,7 +213,7 @@ def test_an_area_of_the_scenario_denies(simulate, flat_data):
     assert 5 < sum(lost) < 40
 
 
-def test_fix_tells_its_covariance_and_service(simulate, flat_data):
+def test_fix_holds_its_covariance_and_service(simulate, flat_data):
     fixes, velocities, _ = fly(simulate, flat_data, gnss={})
     model, fix = GnssModel.load("gnss_m8"), fixes[3].message
     assert (fix.status.status, fix.status.service, fix.position_covariance_type) == (0, 1, 2)
@@ -239,7 +239,7 @@ def test_too_late_a_receiver_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("world", "said"),
+    ("world", "message"),
     [
         ({"origin": {"latitude_deg": 91.0}}, "world.origin.latitude_deg"),
         ({"gnss_denied_areas": [{"kind": "box", "region_m": [5, 0, 1, 9]}]}, "min < max"),
@@ -262,9 +262,9 @@ def test_too_late_a_receiver_is_refused():
         ({"magnetic_field": {"inclination_deg": 120.0}}, "world.magnetic_field.inclination_deg"),
     ],
 )
-def test_wrong_worlds_are_refused(flat_data, world, said):
+def test_wrong_worlds_are_refused(flat_data, world, message):
     flat_data["world"] = world
-    with pytest.raises(ScenarioError, match=said):
+    with pytest.raises(ScenarioError, match=message):
         parse_scenario(flat_data)
 
 

@@ -248,8 +248,8 @@ def test_echoes_farther_apart_than_a_pulse_do_not_mix():
 def test_scans_do_not_depend_on_threads_or_batch():
     forest, terrain = small_forest(), Terrain.flat(extent_m=20.0)
     rng = np.random.default_rng(0)
-    place = np.column_stack([rng.uniform(2, 18, (6, 2)), rng.uniform(1.5, 4, 6)])
-    history = new_history(place, np.tile([0, 0, 0, 1.0], (6, 1)), DT_NS)
+    positions = np.column_stack([rng.uniform(2, 18, (6, 2)), rng.uniform(1.5, 4, 6)])
+    history = new_history(positions, np.tile([0, 0, 0, 1.0], (6, 1)), DT_NS)
     mounts = stack_mounts([make_mount(), make_mount(amplitude_rad=0.6, period_s=2.0)])
     uav, mount = np.repeat(np.arange(6), 2), np.tile([0, 1], 6)
     key = [int(stream_key(7, f"uav{u}/{m}")) for u, m in zip(uav, mount, strict=True)]

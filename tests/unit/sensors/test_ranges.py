@@ -45,7 +45,7 @@ def test_imu_is_cut_at_full_scale_on_each_axis():
 
 
 def test_errors_come_before_the_cut():
-    """A reading within reach of the full scale ends there, whatever its noise adds."""
+    """A measurement close to the full scale is clipped there, whatever its noise adds."""
     fleet = shaken([176.5, 0.0, 0.0])
     bank = imus(500)
     forces = np.array([bank.sample(k, 0, fleet).specific_force[:, 0] for k in range(20)])

@@ -137,7 +137,7 @@ def test_a_rosette_does_not_repeat_within_ten_seconds():
 
 
 def coverage(scan, sweeps, cell_deg=0.28):
-    """Share of the field of view's cells that a beam has met: the beam's longer divergence."""
+    """Fraction of the field of view's cells that a beam has met: the beam's longer divergence."""
     half = 19.2
     edges = np.arange(-half, half + cell_deg, cell_deg)
     hit = np.zeros((len(edges) - 1,) * 2, dtype=bool)
@@ -152,8 +152,8 @@ def coverage(scan, sweeps, cell_deg=0.28):
 
 def test_coverage_grows_with_integration_time_to_the_whole_field_of_view():
     scan = load_lidar("mid_40").scan
-    shares = [coverage(scan, sweeps) for sweeps in (1, 2, 5, 10, 30)]
-    np.testing.assert_allclose(shares, [0.20, 0.37, 0.71, 0.93, 1.0], atol=0.01)
+    fractions = [coverage(scan, sweeps) for sweeps in (1, 2, 5, 10, 30)]
+    np.testing.assert_allclose(fractions, [0.20, 0.37, 0.71, 0.93, 1.0], atol=0.01)
 
 
 # ------------------------------------------------------------------------------------ users' files

@@ -57,10 +57,10 @@ def test_imu_integrates_to_the_true_velocity(simulate, flat_data):
     simulation.graph.subscribe(
         "/uav1/ground_truth/odom", lambda m: attitudes.append(m.message.pose.pose.orientation)
     )
-    readings = messages(simulation, "/uav1/imu", 4.0)
+    messages_ = messages(simulation, "/uav1/imu", 4.0)
     simulation.uavs["uav1"].go_to([4.0, 2.0, 3.0])
     simulation.run(1.5)
-    force = np.array([vector(r.linear_acceleration) for r in readings[1:]])
+    force = np.array([vector(r.linear_acceleration) for r in messages_[1:]])
     attitude = np.array([[q.x, q.y, q.z, q.w] for q in attitudes[1:]])
     velocity = (rotations.rotate(attitude, force) - [0, 0, G]).sum(axis=0) * 1e-3
     np.testing.assert_allclose(velocity, simulation.uavs["uav1"].velocity_map, atol=0.05)
@@ -200,7 +200,7 @@ def test_odometry_drifts_with_distance_and_says_so():
         reading = bank.sample(k, 0, fleet)
     error = reading.position_odom - fleet.state.position_map[0]
     along = model.horizontal_drift_m_sqrt_m * math.sqrt(distance)
-    # A random walk of the yaw bends the way: sideways variance yaw_drift^2 distance^3 / 3.
+    # A random walk of the yaw bends the path: sideways variance yaw_drift^2 distance^3 / 3.
     across = math.hypot(along, model.yaw_drift_rad_sqrt_m * math.sqrt(distance**3 / 3.0))
     assert error[:, 0].std() == pytest.approx(along, rel=0.1)
     assert error[:, 1].std() == pytest.approx(across, rel=0.1)

@@ -1,4 +1,4 @@
-"""Stands in for TensorBoard: answers with what it was asked for, and ends with its standard input.
+"""Stands in for TensorBoard: responds with the request, and ends with its standard input.
 
 With an argument it starts badly: `silent`, `broken` (ends at once) or `failing` (status 500).
 """
@@ -17,8 +17,8 @@ class Handler(BaseHTTPRequestHandler):
         path = self.path.partition("?")[0].removeprefix("/tensorboard")
         if path == "/gone":
             os._exit(3)
-        told = {"target": self.path, "headers": {k.lower(): v for k, v in self.headers.items()}}
-        body = json.dumps(told).encode()
+        request = {"target": self.path, "headers": {k.lower(): v for k, v in self.headers.items()}}
+        body = json.dumps(request).encode()
         length = {"/short": len(body) + 10, "/huge": 10**9}.get(path, len(body))
         self.send_response(500 if HOW == "failing" else 404 if path == "/missing" else 200)
         self.send_header("Content-Type", "text/html" if path == "/" else "application/json")

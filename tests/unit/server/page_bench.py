@@ -54,7 +54,7 @@ def serving(world=None, **settings):
             yield server
 
 
-class Answer:
+class Response:
     def __init__(self, response):
         self.status = response.status
         self.headers = response.headers
@@ -69,13 +69,13 @@ class Answer:
         return self.json["error"]
 
 
-def ask(server, path, method="GET", body=None, **headers):
+def fetch(server, path, method="GET", body=None, **headers):
     """One request; the path goes out as it stands. Underlines in names of headers are dashes."""
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=900)
     try:
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         connection.request(method, path, body, named)
-        return Answer(connection.getresponse())
+        return Response(connection.getresponse())
     finally:
         connection.close()
 
@@ -123,10 +123,10 @@ class Client:
         return found["values"], found["result"]
 
 
-def eventually(question, seconds=60.0):
+def eventually(condition, seconds=60.0):
     """Wait until something is true."""
     end = time.monotonic() + seconds
-    while not (found := question()):
+    while not (found := condition()):
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.02)
     return found

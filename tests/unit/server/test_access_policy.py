@@ -52,8 +52,8 @@ def test_services_that_change_nothing_say_so_by_their_names():
     """The list can be read over: getters, lists, questions of rosapi."""
     for name in READ_ONLY_SERVICES:
         last = name.rsplit("/", 1)[-1]
-        telling = last == "info" or last.startswith(("get_", "list_"))
-        assert name.startswith("/rosapi/") or telling, name
+        is_query = last == "info" or last.startswith(("get_", "list_"))
+        assert name.startswith("/rosapi/") or is_query, name
         assert "set" not in last.split("_")
 
 
@@ -61,10 +61,10 @@ class Two:
     """Two operators at one simulation of two UAVs."""
 
     def __init__(self):
-        self.operators, crew = ControlAuthority(lambda: ("uav1", "uav2")), OperatorNames()
+        self.operators, names = ControlAuthority(lambda: ("uav1", "uav2")), OperatorNames()
         self.now_s = 0.0
-        self.anna = OperatorPolicy(crew.sign_in("Anna"), crew, self.operators, lambda: self.now_s)
-        self.ben = OperatorPolicy(crew.sign_in("Ben"), crew, self.operators, lambda: self.now_s)
+        self.anna = OperatorPolicy(names.sign_in("Anna"), names, self.operators, lambda: self.now_s)
+        self.ben = OperatorPolicy(names.sign_in("Ben"), names, self.operators, lambda: self.now_s)
         self.operators.take("uav1", "Anna")
 
 
@@ -111,16 +111,16 @@ def test_all_else_is_free(operation):
 
 def test_a_stream_of_commands_is_refused_once_a_second():
     two, command = Two(), COMMANDS[0]
-    told = 0
+    num_errors = 0
     for two.now_s in (0.0, 0.1, 0.5, 0.99, 1.0, 1.5, 2.1):
         try:
             assert two.ben.check(command) is False
         except BridgeError:
-            told += 1
-    assert told == 3
+            num_errors += 1
+    assert num_errors == 3
 
 
-def test_nobody_speaks_for_somebody_else():
+def test_no_operator_speaks_for_another():
     two = Two()
     for service in ("/volery/release_control", "/volery/hand_over"):
         with pytest.raises(BridgeError, match="you are Ben, not Anna"):
@@ -149,9 +149,9 @@ def test_a_operator_may_take_another_name_with_the_first_uav():
 
 
 def test_names_are_ones_own():
-    crew = OperatorNames()
-    assert [crew.sign_in("Anna"), crew.sign_in("Anna")] == ["Anna", "Anna 2"]
-    assert [crew.sign_in(), crew.sign_in("\n")] == ["operator 1", "operator 2"]
-    crew.sign_out("Anna")
-    assert crew.sign_in("Anna") == "Anna"
-    assert len(crew.sign_in("x" * 500)) <= 40
+    names = OperatorNames()
+    assert [names.sign_in("Anna"), names.sign_in("Anna")] == ["Anna", "Anna 2"]
+    assert [names.sign_in(), names.sign_in("\n")] == ["operator 1", "operator 2"]
+    names.sign_out("Anna")
+    assert names.sign_in("Anna") == "Anna"
+    assert len(names.sign_in("x" * 500)) <= 40

@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 import numpy as np
 import pytest
 from live_graph import LiveGraph
-from page_bench import TOKENS, VIEWER, Client, ask, eventually, serving
+from page_bench import TOKENS, VIEWER, Client, eventually, fetch, serving
 from websockets.exceptions import ConnectionClosed
 
 from volery.cli import pages
@@ -28,21 +28,21 @@ def server(flight):
         yield server
 
 
-def test_status_tells_what_flies(server, flight):
-    told = ask(server, "/api/status").json
-    assert told["state"] == "flying"
-    assert told["scenario"] == "hover"
-    assert (told["title"], told["unasked"]) == ("First hover", False)
-    assert told["description"].startswith("One F450")
-    assert told["world"] == flight.simulation.geometry.id
-    assert told["role"] == "operator"
-    assert told["token_needed"] is False
-    assert told["message"] == ""
+def test_status_names_what_flies(server, flight):
+    status = fetch(server, "/api/status").json
+    assert status["state"] == "flying"
+    assert status["scenario"] == "hover"
+    assert (status["title"], status["unasked"]) == ("First hover", False)
+    assert status["description"].startswith("One F450")
+    assert status["world"] == flight.simulation.geometry.id
+    assert status["role"] == "operator"
+    assert status["token_needed"] is False
+    assert status["message"] == ""
 
 
-def test_a_first_scenario_that_nobody_named_is_unasked_until_another_one_flies(flight):
+def test_a_first_scenario_by_default_is_unasked_until_another_one_flies(flight):
     def unasked(server):
-        return ask(server, "/api/status").json["unasked"]
+        return fetch(server, "/api/status").json["unasked"]
 
     with serving(unasked=True) as server:
         assert unasked(server)
@@ -56,19 +56,19 @@ def test_a_first_scenario_that_nobody_named_is_unasked_until_another_one_flies(f
 def test_states_between_worlds():
     idle = IdleServer(lambda _name: None)
     with serving() as server:
-        assert ask(server, "/api/status").json["state"] == "building"
+        assert fetch(server, "/api/status").json["state"] == "building"
         server.building("longleaf", "Pines.", "hover: no place")
-        told = ask(server, "/api/status").json
-        assert (told["state"], told["scenario"]) == ("building", "longleaf")
-        assert (told["message"], told["world"]) == ("hover: no place", None)
+        status = fetch(server, "/api/status").json
+        assert (status["state"], status["scenario"]) == ("building", "longleaf")
+        assert (status["message"], status["world"]) == ("hover: no place", None)
         with Client(server) as client:
             assert client.to_the_end() == 1012
         with server.showing(idle):
-            assert ask(server, "/api/status").json["state"] == "no_world"
-            assert ask(server, "/api/world.glb").status == 404
+            assert fetch(server, "/api/status").json["state"] == "no_world"
+            assert fetch(server, "/api/world.glb").status == 404
         with server.showing(idle, "longleaf: no place"):
-            told = ask(server, "/api/status").json
-            assert (told["state"], told["message"]) == ("failed", "longleaf: no place")
+            status = fetch(server, "/api/status").json
+            assert (status["state"], status["message"]) == ("failed", "longleaf: no place")
 
 
 def test_clients_take_part_in_the_graph(server):
@@ -89,11 +89,11 @@ def test_services_that_change_nothing_are_there(server, flight):
     assert READ_ONLY_SERVICES - elsewhere <= offered
 
 
-def test_who_comes_learns_which_world_it_is(server, flight):
+def test_new_clients_receive_the_world_id(server, flight):
     with Client(server) as client:
         client.send("subscribe", topic="/volery/world")
-        told = client.until("publish", topic="/volery/world")["msg"]["data"]
-        assert told == flight.simulation.geometry.id
+        world_id = client.until("publish", topic="/volery/world")["msg"]["data"]
+        assert world_id == flight.simulation.geometry.id
 
 
 def test_a_world_that_goes_sends_its_clients_to_the_next(flight):
@@ -111,7 +111,7 @@ def test_a_world_that_goes_sends_its_clients_to_the_next(flight):
     assert not [name for name in names if name.startswith("page")]
 
 
-def test_a_viewer_sees_and_is_told_why_not_more(flight):
+def test_a_viewer_sees_and_learns_why_not_more(flight):
     with (
         serving(flight.simulation, tokens=TOKENS) as server,
         Client(server, additional_headers={"Authorization": f"Bearer {VIEWER}"}) as client,
@@ -136,7 +136,7 @@ def test_one_operator_at_a_time(server, flight):
         with Client(server, "?operator=Anna") as anna:
             values, _ = anna.call("/volery/take_control", uav="uav2")
             assert values == {"success": True, "message": "Anna steers uav2"}
-            assert operators.holder_of("uav2") == "Anna"
+            assert operators.operator_of("uav2") == "Anna"
             ben.send("subscribe", topic="/volery/vehicles")
             eventually(lambda: ben.until("publish")["msg"]["vehicles"][1]["operator"] == "Anna")
             values, success = ben.call("/uav2/hold")
@@ -148,33 +148,33 @@ def test_one_operator_at_a_time(server, flight):
             assert "held by Anna" in ben.until("status", id="c")["msg"]
             assert anna.call("/uav2/hold")[1]
             assert anna.call("/volery/hand_over", uav="uav2", to="Ben")[0]["success"]
-            assert operators.holder_of("uav2") == "Ben"
+            assert operators.operator_of("uav2") == "Ben"
             assert ben.call("/uav2/hold")[1]
             anna.call("/volery/take_control", uav="uav1")
-        eventually(lambda: operators.holder_of("uav1") == "")  # Anna has left
-        assert operators.holder_of("uav2") == "Ben"
-    eventually(lambda: operators.holder_of("uav2") == "")
+        eventually(lambda: operators.operator_of("uav1") == "")  # Anna has left
+        assert operators.operator_of("uav2") == "Ben"
+    eventually(lambda: operators.operator_of("uav2") == "")
 
 
 def test_the_world_is_fetched_once(server, flight):
-    plain = ask(server, "/api/world.glb")
+    plain = fetch(server, "/api/world.glb")
     assert plain.headers["Content-Type"] == "model/gltf-binary"
     assert plain.body.startswith(b"glTF")
-    zipped = ask(server, "/api/world.glb", Accept_Encoding="gzip, br")
+    zipped = fetch(server, "/api/world.glb", Accept_Encoding="gzip, br")
     assert zipped.headers["Content-Encoding"] == "gzip"
     assert gzip.decompress(zipped.body) == plain.body
     assert flight.simulation.geometry.id in plain.headers["ETag"]
-    for answer, how in ((plain, {}), (zipped, {"Accept_Encoding": "gzip"})):
-        again = ask(server, "/api/world.glb", If_None_Match=answer.headers["ETag"], **how)
+    for response, how in ((plain, {}), (zipped, {"Accept_Encoding": "gzip"})):
+        again = fetch(server, "/api/world.glb", If_None_Match=response.headers["ETag"], **how)
         assert (again.status, again.body) == (304, b"")
-    assert ask(server, "/api/world.glb", If_None_Match='"other"').status == 200
+    assert fetch(server, "/api/world.glb", If_None_Match='"other"').status == 200
     assert plain.headers["Cache-Control"] == "no-cache"
-    named = ask(server, f"/api/world.glb?world={flight.simulation.geometry.id}")
+    named = fetch(server, f"/api/world.glb?world={flight.simulation.geometry.id}")
     assert "immutable" in named.headers["Cache-Control"]
-    other = ask(server, "/api/world.glb?world=other")
+    other = fetch(server, "/api/world.glb?world=other")
     assert other.headers["Cache-Control"] == "no-cache"
-    assert ask(server, "/api/world.glb?detail=finest").status == 400
-    assert ask(server, "/api/world.glb?detail=coarse").status == 200
+    assert fetch(server, "/api/world.glb?detail=finest").status == 400
+    assert fetch(server, "/api/world.glb?detail=coarse").status == 200
 
 
 def test_a_message_that_is_too_large_ends_the_connection(server):
@@ -183,11 +183,11 @@ def test_a_message_that_is_too_large_ends_the_connection(server):
         with suppress(ConnectionClosed):
             client.socket.send([megabyte] * 70, text=True)
         assert client.to_the_end() in (None, 1009)
-    assert ask(server, "/api/status").json["state"] == "flying"
+    assert fetch(server, "/api/status").json["state"] == "flying"
 
 
-def test_who_stops_reading_loses_messages_of_its_own():
-    """120 pictures of 1 MB: who reads gets all, for who does not a handful is kept."""
+def test_a_client_that_stops_reading_loses_its_own_messages_only():
+    """120 images of 1 MB: a client that reads gets all, another one a handful."""
     world = LiveGraph()
     image = zero_message("sensor_msgs/msg/Image")
     image.data = np.zeros(1_000_000, np.uint8)
@@ -246,7 +246,7 @@ def test_a_world_is_left_though_a_client_reads_no_more():
         world.close()
 
 
-def test_a_taken_port_is_told():
+def test_a_taken_port_is_reported():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -259,38 +259,38 @@ def test_a_taken_port_is_told():
 
 def test_without_a_build_the_page_says_how_to_make_one(server, monkeypatch, tmp_path):
     monkeypatch.setattr("volery.server.page.STATIC", tmp_path)
-    told = ask(server, "/")
-    assert told.status == 200
-    assert b"make web" in told.body
+    response = fetch(server, "/")
+    assert response.status == 200
+    assert b"make web" in response.body
     (tmp_path / "index.html").write_text("<!doctype html><title>the page</title>")
-    assert b"the page" in ask(server, "/").body
+    assert b"the page" in fetch(server, "/").body
 
 
-def test_what_is_not_there_is_told_as_json(server):
+def test_what_is_not_there_is_reported_as_json(server):
     for path, method, status in (
         ("/api/nothing", "GET", 404),
         ("/api/status", "DELETE", 405),
         ("/api/scenarios/nothing.jpg", "GET", 404),
     ):
-        answer = ask(server, path, method)
-        assert answer.status == status
-        assert json.loads(answer.body)["error"]
+        response = fetch(server, path, method)
+        assert response.status == status
+        assert json.loads(response.body)["error"]
 
 
 def test_without_the_pages_build_nothing_breaks(monkeypatch, tmp_path, capsys):
-    """Status and rosbridge are there; a line tells at the start how the page is built."""
+    """Status and rosbridge are there; a line says at the start how the page is built."""
     monkeypatch.setattr(page, "STATIC", tmp_path / "static")
     with pages.serving(PageSettings(port=0)) as served:
         server = served._server
-        assert "make web" in ask(server, "/").body.decode()
+        assert "make web" in fetch(server, "/").body.decode()
         for path in ("/favicon.ico", "/assets/index.js"):
-            assert ask(server, path).status == 404
-        assert ask(server, "/api/status").status == 200
+            assert fetch(server, path).status == 404
+        assert fetch(server, "/api/status").status == 200
         (tmp_path / "static").mkdir()
         for name in ("index.html", "icon.svg"):
             (tmp_path / "static" / name).write_text(name)
-        assert ask(server, "/icon.svg").status == 200
-    said = capsys.readouterr().err.splitlines()
-    assert said[0].startswith("page    http://127.0.0.1:")
-    assert said[1] == ("warning: the page is not built: run `make web`; the other addresses work")
-    assert len(said) == 2
+        assert fetch(server, "/icon.svg").status == 200
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("page    http://127.0.0.1:")
+    assert lines[1] == ("warning: the page is not built: run `make web`; the other addresses work")
+    assert len(lines) == 2

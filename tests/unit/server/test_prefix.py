@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from urllib.parse import urljoin, urlsplit
 
 import pytest
-from page_bench import OPERATOR, TOKENS, ask, serving
+from page_bench import OPERATOR, TOKENS, fetch, serving
 from websockets.sync.client import connect
 
 PREFIX = "/lab/sim1"
@@ -57,7 +57,7 @@ def server(flight):
 
 
 def get(server, path, **headers):
-    return ask(server, path, Connection="close", **headers)
+    return fetch(server, path, Connection="close", **headers)
 
 
 def test_the_page_and_all_it_asks_for_are_found(server):
@@ -70,9 +70,9 @@ def test_the_page_and_all_it_asks_for_are_found(server):
     assert status.json["role"] == "operator"
     assert get(server, f"{PREFIX}/api/world.glb", Cookie=cookie).body.startswith(b"glTF")
     (card, *_) = get(server, f"{PREFIX}/api/scenarios", Cookie=cookie).json
-    picture = urlsplit(urljoin(page, card["picture"])).path
-    assert picture.startswith(PREFIX)
-    assert get(server, picture, Cookie=cookie).status == 200
+    image = urlsplit(urljoin(page, card["picture"])).path
+    assert image.startswith(PREFIX)
+    assert get(server, image, Cookie=cookie).status == 200
     url = f"ws://127.0.0.1:{server.port}{PREFIX}/rosbridge"
     with connect(url, additional_headers={"Cookie": cookie}) as client:
         client.send('{"op": "subscribe", "topic": "/uav1/odom"}')

@@ -1,4 +1,4 @@
-"""Cards of scenarios, and their pictures."""
+"""Cards of scenarios, and their images."""
 
 import sys
 from io import BytesIO
@@ -6,7 +6,7 @@ from pathlib import Path
 from runpy import run_path
 
 import pytest
-from page_bench import ask, serving
+from page_bench import fetch, serving
 from PIL import Image, ImageStat
 
 from volery.scenario import library
@@ -20,14 +20,14 @@ RENDERER = run_path(str(Path(__file__).parents[3] / "tools" / "scenario_cards.py
 
 
 @pytest.mark.parametrize("name", library.names())
-def test_every_scenario_that_ships_has_a_picture(name):
+def test_every_scenario_that_ships_has_an_image(name):
     path = CARDS / f"{name}.jpg"
-    with Image.open(path) as picture:
-        assert picture.format == "JPEG"
-        assert picture.size == (RENDERER["WIDTH"], RENDERER["HEIGHT"])
-        low, high = picture.convert("L").getextrema()
-        assert high - low > 40, "the picture shows nothing"
-        assert ImageStat.Stat(picture.convert("L")).mean[0] > 60, "the picture is black"
+    with Image.open(path) as image:
+        assert image.format == "JPEG"
+        assert image.size == (RENDERER["WIDTH"], RENDERER["HEIGHT"])
+        low, high = image.convert("L").getextrema()
+        assert high - low > 40, "the image shows nothing"
+        assert ImageStat.Stat(image.convert("L")).mean[0] > 60, "the image is black"
     assert path.stat().st_size < 80_000
 
 
@@ -43,7 +43,7 @@ def test_views_are_of_scenarios_that_ship():
     assert set(RENDERER["VIEWS"]) <= set(library.names())
 
 
-def test_cards_tell_what_the_scenarios_say():
+def test_cards_show_what_the_scenarios_say():
     cards = {card["name"]: card for card in cards_of(ScenarioCatalog())}
     assert list(cards) == list(gallery())
     assert (cards["hover"]["title"], cards["hover"]["section"]) == ("First hover", "Start here")
@@ -66,13 +66,13 @@ def test_cards_say_which_packages_are_missing(monkeypatch):
     assert lacking["hover"] == ""
 
 
-def test_cards_and_pictures_over_http():
+def test_cards_and_images_over_http():
     with serving() as server:
-        cards = ask(server, "/api/scenarios").json
+        cards = fetch(server, "/api/scenarios").json
         for card in cards[:3]:
-            picture = ask(server, card["picture"].removeprefix("."))
-            assert picture.headers["Content-Type"] == "image/jpeg"
-            Image.open(BytesIO(picture.body)).verify()
+            image = fetch(server, card["picture"].removeprefix("."))
+            assert image.headers["Content-Type"] == "image/jpeg"
+            Image.open(BytesIO(image.body)).verify()
 
 
 def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
@@ -84,20 +84,20 @@ def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
     (tmp_path / "hover" / "scenario.toml").write_text("name = 4")  # cannot hide the one that ships
     (tmp_path / ".upload_x").mkdir()
     (tmp_path / ".upload_x" / "scenario.toml").write_text(hover)  # is being checked
-    shelf = ScenarioCatalog(tmp_path)
-    assert shelf.added() == ("broken", "mine")
-    last = cards_of(shelf)[-1]
+    catalog = ScenarioCatalog(tmp_path)
+    assert catalog.added() == ("broken", "mine")
+    last = cards_of(catalog)[-1]
     assert (last["name"], last["uploaded"], last["picture"]) == ("mine", True, None)
-    assert shelf.load("hover").uav_count == 1
+    assert catalog.load("hover").uav_count == 1
 
 
 def test_a_scenario_of_the_command_line_can_be_chosen_again(tmp_path, flat_data):
     mine = parse_scenario({**flat_data, "name": "mine"})
-    shelf = ScenarioCatalog(tmp_path, given=mine)
-    assert shelf.load("mine") is mine
-    assert "mine" in shelf.names()
-    assert [card["name"] for card in cards_of(shelf)] == [*gallery(), "mine"]
-    assert (cards_of(shelf)[-1]["title"], cards_of(shelf)[-1]["section"]) == ("mine", "Yours")
+    catalog = ScenarioCatalog(tmp_path, given=mine)
+    assert catalog.load("mine") is mine
+    assert "mine" in catalog.names()
+    assert [card["name"] for card in cards_of(catalog)] == [*gallery(), "mine"]
+    assert (cards_of(catalog)[-1]["title"], cards_of(catalog)[-1]["section"]) == ("mine", "Yours")
     # It hides none of the others.
     hidden = ScenarioCatalog(tmp_path, given=parse_scenario({**flat_data, "name": "hover"}))
     assert hidden.load("hover") == load_scenario("hover")

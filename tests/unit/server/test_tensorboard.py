@@ -6,7 +6,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
-from page_bench import OPERATOR, TOKENS, VIEWER, ask, eventually, serving
+from page_bench import OPERATOR, TOKENS, VIEWER, eventually, fetch, serving
 
 from volery.core.errors import VoleryError
 from volery.server import page_server
@@ -31,14 +31,14 @@ def server():
 
 @pytest.mark.parametrize("token", [OPERATOR, VIEWER])
 def test_operators_and_viewers_may_look(server, token):
-    shown = ask(server, f"{SERIES}?tag=a%20b&run=", Authorization=f"Bearer {token}")
+    shown = fetch(server, f"{SERIES}?tag=a%20b&run=", Authorization=f"Bearer {token}")
     assert shown.status == 200
     assert shown.json["target"] == f"{SERIES}?tag=a+b&run="
 
 
 def test_nothing_secret_is_passed_on_and_nothing_foreign_comes_back(server):
     query = "?token=operators%27+token&tag=a"
-    shown = ask(
+    shown = fetch(
         server, f"/tensorboard/data/runs{query}", Cookie="a=b", Accept="text/x", X_Other="1"
     )
     assert shown.json["target"] == "/tensorboard/data/runs?tag=a"
@@ -54,7 +54,7 @@ def test_nothing_secret_is_passed_on_and_nothing_foreign_comes_back(server):
 
 
 def test_its_page_has_a_policy_of_its_own(server):
-    shown = ask(server, "/tensorboard/?tensorboardColab=true", **AS_OPERATOR)
+    shown = fetch(server, "/tensorboard/?tensorboardColab=true", **AS_OPERATOR)
     policy = shown.headers.get_all("Content-Security-Policy")
     assert len(policy) == 1
     assert "'unsafe-eval'" in policy[0]
@@ -63,7 +63,7 @@ def test_its_page_has_a_policy_of_its_own(server):
 
 @pytest.mark.parametrize("path", ["/tensorboard", "/tensorboard/", "/tensorboard/?tag=a"])
 def test_its_page_reads_by_get_only_below_any_prefix(server, path):
-    moved = ask(server, path, **AS_OPERATOR)
+    moved = fetch(server, path, **AS_OPERATOR)
     folder = "tensorboard/" if path == "/tensorboard" else ""
     assert moved.status == 307
     assert moved.headers["Location"] == f"{folder}?tensorboardColab=true"
@@ -71,14 +71,14 @@ def test_its_page_reads_by_get_only_below_any_prefix(server, path):
 
 @pytest.mark.parametrize("path", ["/tensorboard", "/tensorboard/", SERIES, "/%74ensorboard/a"])
 def test_without_a_token_there_is_nothing(server, path):
-    assert ask(server, path).status == 401
-    assert ask(server, path, Cookie=f"volery_{server.port}=operator-0").status == 401
+    assert fetch(server, path).status == 401
+    assert fetch(server, path, Cookie=f"volery_{server.port}=operator-0").status == 401
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"])
 @pytest.mark.parametrize("token", [OPERATOR, VIEWER])
 def test_there_is_nothing_but_get(server, method, token):
-    asked = ask(server, SERIES, method, Authorization=f"Bearer {token}")
+    asked = fetch(server, SERIES, method, Authorization=f"Bearer {token}")
     assert asked.status == 405
 
 
@@ -98,54 +98,54 @@ def test_there_is_nothing_but_get(server, method, token):
     ],
 )
 def test_other_addresses_are_refused(server, path, status):
-    assert ask(server, path, **AS_OPERATOR).status == status
+    assert fetch(server, path, **AS_OPERATOR).status == status
 
 
 def test_errors_of_tensorboard_come_through(server):
-    assert ask(server, "/tensorboard/missing", **AS_OPERATOR).status == 404
+    assert fetch(server, "/tensorboard/missing", **AS_OPERATOR).status == 404
 
 
 def test_a_response_has_a_limit(server, monkeypatch):
-    refused = ask(server, "/tensorboard/huge", **AS_OPERATOR)
+    refused = fetch(server, "/tensorboard/huge", **AS_OPERATOR)
     assert refused.status == 502
     assert "64 MB" in refused.error
     monkeypatch.setattr(upstream, "MAX_BODY_BYTES", 1 << 20)
     with pytest.raises(http.client.IncompleteRead):
-        ask(server, "/tensorboard/endless", **AS_OPERATOR)
+        fetch(server, "/tensorboard/endless", **AS_OPERATOR)
 
 
 def test_a_response_that_breaks_off_does_so_for_the_client(server):
     with pytest.raises(http.client.IncompleteRead):
-        ask(server, "/tensorboard/short", **AS_OPERATOR)
+        fetch(server, "/tensorboard/short", **AS_OPERATOR)
 
 
 def test_there_is_a_limit_of_requests(server, monkeypatch):
     monkeypatch.setattr(route, "_MAX_REQUESTS", 0)
-    assert ask(server, "/tensorboard/data/runs", **AS_OPERATOR).status == 503
+    assert fetch(server, "/tensorboard/data/runs", **AS_OPERATOR).status == 503
 
 
 def test_the_status_says_whether_there_is_one(server):
-    assert ask(server, "/api/status", **AS_OPERATOR).json["tensorboard"] is True
-    assert ask(server, "/api/status").json["tensorboard"] is False
+    assert fetch(server, "/api/status", **AS_OPERATOR).json["tensorboard"] is True
+    assert fetch(server, "/api/status").json["tensorboard"] is False
     with serving() as other:
-        assert ask(other, "/api/status").json["tensorboard"] is False
-        refused = ask(other, "/tensorboard/")
+        assert fetch(other, "/api/status").json["tensorboard"] is False
+        refused = fetch(other, "/tensorboard/")
     assert refused.status == 404
     assert "--tensorboard DIR" in refused.error
 
 
 def test_a_tensorboard_that_ended_is_502(monkeypatch, tmp_path):
     with serve(monkeypatch, tmp_path) as server:
-        broken = ask(server, "/tensorboard/gone")
+        broken = fetch(server, "/tensorboard/gone")
         assert broken.status == 502
         assert broken.error.startswith("TensorBoard does not answer")
-        eventually(lambda: "has ended" in ask(server, "/tensorboard/data/runs").error)
+        eventually(lambda: "has ended" in fetch(server, "/tensorboard/data/runs").error)
 
 
 def test_it_ends_with_the_server(monkeypatch, tmp_path):
     with serve(monkeypatch, tmp_path) as server:
         port = server._site.tensorboard.port
-        assert ask(server, "/tensorboard/data/runs").status == 200
+        assert fetch(server, "/tensorboard/data/runs").status == 200
     with pytest.raises(ConnectionRefusedError):
         http.client.HTTPConnection("127.0.0.1", port, timeout=60).request("GET", "/")
 
@@ -202,8 +202,8 @@ def test_the_real_one(tmp_path, monkeypatch):
         with urllib.request.urlopen(f"{server.url}tensorboard/") as page:
             assert page.url.endswith("?tensorboardColab=true")
             assert b"<title>TensorBoard" in page.read()
-        eventually(lambda: ask(server, "/tensorboard/data/runs").json == ["hover"])
+        eventually(lambda: fetch(server, "/tensorboard/data/runs").json == ["hover"])
         query = "?requests=%5B%7B%22plugin%22:%22scalars%22,%22tag%22:%22success%22%7D%5D"
-        (series,) = ask(server, SERIES + query).json
+        (series,) = fetch(server, SERIES + query).json
         assert series["runToSeries"]["hover"][0]["value"] == 0.5
-        assert len(ask(server, "/tensorboard/index.js").body) > 1_000_000
+        assert len(fetch(server, "/tensorboard/index.js").body) > 1_000_000

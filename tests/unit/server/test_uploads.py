@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from page_bench import ask, serving
+from page_bench import fetch, serving
 from PIL import Image
 
 from volery.core.errors import VoleryError
@@ -61,7 +61,7 @@ def test_a_matrix_becomes_blocks(checked):
     assert "my yard.csv" in scenario.description
 
 
-def test_maps_of_movingai_and_pictures(checked, tmp_path):
+def test_maps_of_movingai_and_images(checked, tmp_path):
     scenario = checked("grid_map", ".map", moving_ai())
     assert build_solids(scenario, build_terrain(scenario))
     Image.fromarray(np.array([[255, 0], [255, 255]], np.uint8)).save(tmp_path / "picture.png")
@@ -84,7 +84,7 @@ def room_pgm():
     return b"P5\n3 2\n255\n" + bytes([254, 254, 254, 0, 254, 254])
 
 
-def test_a_map_of_map_server_keeps_its_place_and_cells(checked, tmp_path):
+def test_a_map_of_map_server_keeps_its_origin_and_cells(checked, tmp_path):
     (tmp_path / "grid_map.pgm").write_bytes(room_pgm())
     scenario = checked("grid_map", ".yaml", ROOM)
     (solid,) = build_solids(scenario, build_terrain(scenario))
@@ -156,19 +156,19 @@ def test_projected_coordinates_are_moved_to_the_origin(checked):
         ("forest", ".csv", b"x_m,y_m\n1,nan\n", "row 2"),
     ],
 )
-def test_what_is_wrong_is_told_in_a_sentence(checked, kind, suffix, content, why):
+def test_what_is_wrong_is_reported_in_a_sentence(checked, kind, suffix, content, why):
     with pytest.raises(VoleryError, match=why):
         checked(kind, suffix, content)
 
 
 def test_there_are_limits(checked, monkeypatch):
-    monkeypatch.setattr(scenario_builder, "MOST_CELLS", 3)
+    monkeypatch.setattr(scenario_builder, "MAX_CELLS", 3)
     with pytest.raises(VoleryError, match="4 x 1 cells; at most 3"):
         checked("grid_map", ".csv", b"0,0,0,1\n")
-    monkeypatch.setattr(scenario_builder, "MOST_TREES", 2)
+    monkeypatch.setattr(scenario_builder, "MAX_TREES", 2)
     with pytest.raises(VoleryError, match="3 trees; allowed are 1 to 2"):
         checked("forest", ".csv", INVENTORY)
-    monkeypatch.setattr(scenario_builder, "MOST_TRIANGLES", 11)
+    monkeypatch.setattr(scenario_builder, "MAX_TRIANGLES", 11)
     with pytest.raises(VoleryError, match="12 triangles; at most 11"):
         checked("mesh", ".stl", box())
 
@@ -242,7 +242,7 @@ def test_a_scenario_keeps_all_but_its_name(checked):
         ),
     ],
 )
-def test_a_scenario_of_a_stranger_reaches_nothing_of_the_server(checked, text, why):
+def test_a_foreign_scenario_reaches_nothing_of_the_server(checked, text, why):
     with pytest.raises(VoleryError, match=why):
         checked("scenario", ".toml", text.encode())
 
@@ -255,44 +255,46 @@ def server(tmp_path_factory):
 
 def test_a_good_file_over_http_can_be_loaded(server):
     path = "/api/uploads?kind=grid_map&name=My%20Hall.csv"
-    answer = ask(server, path, "POST", b"0,0\n0,1\n")
-    assert (answer.status, answer.json) == (201, {"scenario": "my_hall"}), answer.body
-    card = ask(server, "/api/scenarios").json[-1]
+    response = fetch(server, path, "POST", b"0,0\n0,1\n")
+    assert (response.status, response.json) == (201, {"scenario": "my_hall"}), response.body
+    card = fetch(server, "/api/scenarios").json[-1]
     assert (card["name"], card["world"], card["uploaded"]) == ("my_hall", "grid_map", True)
 
 
 def test_a_map_of_map_server_over_http_comes_with_its_image(server):
     query = f"kind=grid_map&name=room.yaml&image=room.pgm&head={len(ROOM)}"
-    answer = ask(server, f"/api/uploads?{query}", "POST", ROOM + room_pgm())
-    assert (answer.status, answer.json) == (201, {"scenario": "room"}), answer.body
-    before = ask(server, "/api/scenarios").json
+    response = fetch(server, f"/api/uploads?{query}", "POST", ROOM + room_pgm())
+    assert (response.status, response.json) == (201, {"scenario": "room"}), response.body
+    before = fetch(server, "/api/scenarios").json
     broken = b"image: room.pgm\nresolution: 0.5\n"
     query = f"kind=grid_map&name=b.yaml&image=b.pgm&head={len(broken)}"
-    answer = ask(server, f"/api/uploads?{query}", "POST", broken + room_pgm())
-    assert answer.status == 422
-    assert "b.yaml: origin must be [x, y, yaw]" in answer.error
-    assert "/" not in answer.error
-    assert ask(server, "/api/scenarios").json == before
+    response = fetch(server, f"/api/uploads?{query}", "POST", broken + room_pgm())
+    assert response.status == 422
+    assert "b.yaml: origin must be [x, y, yaw]" in response.error
+    assert "/" not in response.error
+    assert fetch(server, "/api/scenarios").json == before
 
 
 def test_a_scenario_over_http_can_be_loaded(server):
-    answer = ask(server, "/api/uploads?kind=scenario&name=My%20Flight.toml", "POST", OWN.encode())
-    assert (answer.status, answer.json) == (201, {"scenario": "my_flight"}), answer.body
-    cards = {card["name"]: card for card in ask(server, "/api/scenarios").json}
+    response = fetch(
+        server, "/api/uploads?kind=scenario&name=My%20Flight.toml", "POST", OWN.encode()
+    )
+    assert (response.status, response.json) == (201, {"scenario": "my_flight"}), response.body
+    cards = {card["name"]: card for card in fetch(server, "/api/scenarios").json}
     assert cards["my_flight"]["airframes"] == ["f450"]
-    answer = ask(server, "/api/uploads?kind=scenario&name=b.toml", "POST", b"name = [")
-    assert answer.status == 422
-    assert "b.toml: not valid TOML" in answer.error
-    assert "/" not in answer.error
+    response = fetch(server, "/api/uploads?kind=scenario&name=b.toml", "POST", b"name = [")
+    assert response.status == 422
+    assert "b.toml: not valid TOML" in response.error
+    assert "/" not in response.error
 
 
 def test_a_bad_file_over_http_leaves_nothing_behind(server):
-    before = ask(server, "/api/scenarios").json
-    answer = ask(server, "/api/uploads?kind=grid_map&name=hall.csv", "POST", b"0,x\n")
-    assert answer.status == 422
-    assert "hall.csv, line 1, column 2: 'x'; allowed are 0 and 1" in answer.error
-    assert "/" not in answer.error  # no path of the server
-    assert ask(server, "/api/scenarios").json == before
+    before = fetch(server, "/api/scenarios").json
+    response = fetch(server, "/api/uploads?kind=grid_map&name=hall.csv", "POST", b"0,x\n")
+    assert response.status == 422
+    assert "hall.csv, line 1, column 2: 'x'; allowed are 0 and 1" in response.error
+    assert "/" not in response.error  # no path of the server
+    assert fetch(server, "/api/scenarios").json == before
 
 
 @pytest.mark.parametrize(
@@ -310,27 +312,27 @@ def test_a_bad_file_over_http_leaves_nothing_behind(server):
     ],
 )
 def test_refusals_over_http(server, query, body, status, why):
-    answer = ask(server, f"/api/uploads?{query}", "POST", body)
-    assert answer.status == status
-    assert why in answer.error
+    response = fetch(server, f"/api/uploads?{query}", "POST", body)
+    assert response.status == status
+    assert why in response.error
 
 
 def test_too_large_a_file_is_not_read_to_its_end(server, monkeypatch):
     small = kinds.Kind((".csv",), 1000, "trees")
     monkeypatch.setitem(KINDS, "forest", small)
-    answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", b"x" * 1001)
-    assert answer.status == 413
-    assert "0.001 MB" in answer.error
+    response = fetch(server, "/api/uploads?kind=forest&name=a.csv", "POST", b"x" * 1001)
+    assert response.status == 413
+    assert "0.001 MB" in response.error
 
     def endless():
         for _ in range(100):
             yield b"x" * 100
 
-    answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", endless())
-    assert answer.status == 413
+    response = fetch(server, "/api/uploads?kind=forest&name=a.csv", "POST", endless())
+    assert response.status == 413
 
 
 def test_a_server_without_a_folder_takes_nothing():
     with serving() as server:
-        answer = ask(server, "/api/uploads?kind=forest&name=a.csv", "POST", INVENTORY)
-        assert answer.status == 409
+        response = fetch(server, "/api/uploads?kind=forest&name=a.csv", "POST", INVENTORY)
+        assert response.status == 409

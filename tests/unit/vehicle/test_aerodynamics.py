@@ -111,12 +111,12 @@ def fly_on_without(airframe, rotor, seconds=12.0):
     fleet = in_air(airframe)
     fleet.advance(1000, FAR_BELOW)
     fleet.set_rotor_health(0, rotor, 0.0)
-    place = []
+    track = []
     for _ in range(round(seconds * 100)):
         fleet.advance(10, FAR_BELOW)
-        place.append(fleet.state.position_map[0].copy())
-    place = np.array(place)
-    return place[:, 2].min(), np.linalg.norm(place[:, :2], axis=1).max()
+        track.append(fleet.state.position_map[0].copy())
+    track = np.array(track)
+    return track[:, 2].min(), np.linalg.norm(track[:, :2], axis=1).max()
 
 
 def test_a_hexarotor_flies_on_without_a_rotor_and_a_quadrotor_does_not():

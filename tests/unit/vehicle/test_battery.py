@@ -103,7 +103,7 @@ def test_hover_endurance(name):
     assert 5.0 < nominal / power / 60.0 < 30.0
 
 
-def test_levels_are_told_once_and_an_empty_pack_lets_it_fall():
+def test_levels_are_reported_once_and_an_empty_pack_lets_it_fall():
     fleet = Fleet([with_battery(capacity_ah=0.1)], [[0, 0, 200.0]], [LEVEL], battery_charge=0.3)
     fleet.advance(8000, FLAT)
     noted = [e for e in fleet.drain_events() if e.kind is FleetEventKind.BATTERY]
@@ -132,7 +132,7 @@ def test_sag_takes_the_top_of_the_thrust():
 
 
 def test_attitude_stays_in_hand_when_thrust_runs_out():
-    """Asked to climb on a weak pack, it climbs slowly and stays upright."""
+    """Commanded to climb on a weak pack, it climbs slowly and stays upright."""
     weak = with_battery(rated_v=18.5)
     fleet = Fleet([weak], [[0, 0, 50.0]], [LEVEL], battery_charge=0.3)
     fleet.command_velocity_map(0, (6, 0, 3))

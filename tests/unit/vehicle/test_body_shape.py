@@ -86,7 +86,7 @@ def test_a_camera_sees_the_colours_of_the_airframe(scene):
     )
     assert len(rows[0]) > 100
     assert len(rows[1]) > 100
-    assert rows[0].mean() < 130 < 170 < rows[1].mean()  # the picture's top is ahead
+    assert rows[0].mean() < 130 < 170 < rows[1].mean()  # the image's top is ahead
     red = colour[material == Material.UAV_RED].mean(axis=0)
     blue = colour[material == Material.UAV_BLUE].mean(axis=0)
     assert red[0] > 2 * red[1:].max()

@@ -1,4 +1,4 @@
-"""Downwash: the jet's momentum, who feels it, and the search for neighbours."""
+"""Downwash: the jet's momentum, which UAVs it pushes, and the search for neighbours."""
 
 import numpy as np
 import pytest
@@ -61,13 +61,13 @@ def test_the_jet_ends_smoothly():
 
 def pair(offset, airframe=F450, copies=0):
     """Air velocity at two UAVs, the second `offset` from the first, after one step."""
-    place = np.array([[0, 0, 50.0], np.array([0, 0, 50.0]) + offset])
-    fleet = Fleet([airframe] * 2, place, [LEVEL] * 2, copies=copies)
+    positions = np.array([[0, 0, 50.0], np.array([0, 0, 50.0]) + offset])
+    fleet = Fleet([airframe] * 2, positions, [LEVEL] * 2, copies=copies)
     fleet.advance(1, FLAT)
     return fleet.state.air_velocity_map
 
 
-def test_above_pushes_below_and_nobody_beside():
+def test_above_pushes_below_and_no_uav_beside():
     air = pair([0.1, 0, -2.0])
     assert air[0, 2] == 0.0
     thrust = 2.065 * 9.80665
@@ -102,16 +102,16 @@ def test_the_lower_one_holds_against_it():
 
 
 def brute_force(fleet):
-    """Downwash of all pairs, written anew."""
-    place, count = fleet.state.position_map, len(fleet)
+    """Downwash of all pairs, a second implementation."""
+    positions, count = fleet.state.position_map, len(fleet)
     total = np.zeros(count)
     for j in range(count):
         frame = fleet.airframes[j]
         radius = np.sqrt(len(frame.rotors.places)) * frame.rotors.radius_m
         lift = fleet.get_state()["uavs"]["body"]["rotor_lift"][j]
         thrust = (lift * fleet.state.rotor_speed[j] ** 2).sum()
-        r = np.hypot(*(place[:, :2] - place[j, :2]).T)
-        s = place[j, 2] - place[:, 2]
+        r = np.hypot(*(positions[:, :2] - positions[j, :2]).T)
+        s = positions[j, 2] - positions[:, 2]
         inside = (s > 0) & (s < 100 * radius) & (r < 2.5 * (radius + 0.1 * s))
         v = np.sqrt(thrust / (2 * RHO * np.pi * radius**2))
         b = radius + 0.1 * s
@@ -131,10 +131,10 @@ def crowd(order):
     """Sixty UAVs of two kinds that cross over and under each other."""
     rng = np.random.default_rng(8)
     count = 60
-    place = np.column_stack([rng.uniform(0, 25, (count, 2)), rng.uniform(40, 60, count)])
+    positions = np.column_stack([rng.uniform(0, 25, (count, 2)), rng.uniform(40, 60, count)])
     goal = np.column_stack([rng.uniform(0, 25, (count, 2)), rng.uniform(40, 60, count)])
     frames = [F450 if k % 3 else load_airframe("hummingbird") for k in range(count)]
-    fleet = Fleet([frames[k] for k in order], place[order], [LEVEL] * count)
+    fleet = Fleet([frames[k] for k in order], positions[order], [LEVEL] * count)
     for row, k in enumerate(order):
         fleet.command_position(row, goal[k])
     return fleet

@@ -6,7 +6,7 @@ from flown_plants import F450, LEVEL, plant, ring
 
 from volery.control.fleet import Fleet
 from volery.vehicle.compiled import fused_kernel
-from volery.vehicle.ground_effect import ground_share
+from volery.vehicle.ground_effect import ground_fraction
 from volery.world.terrain import Terrain
 
 FLAT = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0))
@@ -16,7 +16,7 @@ R = F450.rotors.radius_m
 @fused_kernel
 def _shares(plants, heights, out):
     for k in range(len(heights)):
-        out[k] = ground_share(plants[0], heights[k])
+        out[k] = ground_fraction(plants[0], heights[k])
 
 
 def factor(plants, heights):
@@ -34,13 +34,13 @@ def test_published_numbers_at_one_radius():
 def test_quad_form_term_by_term():
     d, b = 2 * 0.159, 2 * 0.159 * np.sqrt(2)
     for z in (0.07, 0.2, 0.5, 0.7):
-        share = (
+        fraction = (
             (R / (4 * z)) ** 2
             + R**2 * z / (d**2 + 4 * z**2) ** 1.5
             + R**2 / 2 * z / (2 * d**2 + 4 * z**2) ** 1.5
             + 2 * R**2 * z * 2.0 / (b**2 + 4 * z**2) ** 1.5
         )
-        assert factor(plant(F450), [z])[0] == pytest.approx(1 / (1 - share), rel=1e-12)
+        assert factor(plant(F450), [z])[0] == pytest.approx(1 / (1 - fraction), rel=1e-12)
 
 
 def test_fades_out_smoothly_and_never_grows_with_height():
@@ -68,8 +68,8 @@ def test_a_hovering_uav_feels_it_and_a_fast_one_less():
     assert hovering(0.25) == pytest.approx(wanted, abs=1e-4)
     assert hovering(2.0) == pytest.approx(1.0, abs=1e-6)
     induced = 2.065 * 9.80665 / 4 / (2 * 1.225 * np.pi * R**2)
-    share = (1 - 1 / wanted) / (1 + 5.0**2 / induced)
-    assert hovering(0.25, 5.0) == pytest.approx(1 / (1 - share), abs=2e-4)
+    fraction = (1 - 1 / wanted) / (1 + 5.0**2 / induced)
+    assert hovering(0.25, 5.0) == pytest.approx(1 / (1 - fraction), abs=2e-4)
 
 
 def flights(slices):

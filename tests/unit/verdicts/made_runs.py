@@ -52,14 +52,14 @@ def run_of(flight: FlightResult, *expectations: dict[str, Any], **parts: Any) ->
 
 
 class Posts:
-    """A scene of endless vertical posts without thickness; counts the points that are asked."""
+    """A scene of endless vertical posts without thickness; counts the points of its queries."""
 
     def __init__(self, posts: Any) -> None:
         self._posts = np.reshape(np.asarray(posts, np.float64), (-1, 2))
         self.asked = 0
 
     def clearance(self, points: Any, reach_m: float, include_terrain: bool = True) -> Any:
-        """Returns distances (P,), inf beyond the reach."""
+        """Returns distances (P,), inf beyond the radius."""
         assert not include_terrain
         self.asked += len(points)
         offset = np.asarray(points)[:, None, :2] - self._posts

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_runs import Posts, flight_of, line
 
-from volery.verdicts.measures import REACH_M, area_m2, nearest_obstacle, nearest_pair
+from volery.verdicts.measures import MAX_CLEARANCE_M, area_m2, nearest_obstacle, nearest_pair
 
 
 @given(seed=st.integers(0, 10_000))
@@ -20,7 +20,7 @@ def test_the_nearest_obstacle_is_that_of_all_samples(seed):
     radius = rng.uniform(0.1, 0.5, 3)
     found = nearest_obstacle(flight, scene, radius_m=radius)
     distance = np.array([scene.clearance(p, 1e9, False).distance for p in flight.position_map])
-    gaps = np.minimum(distance, REACH_M) - radius[:, None]
+    gaps = np.minimum(distance, MAX_CLEARANCE_M) - radius[:, None]
     assert found.distance_m == pytest.approx(gaps.min())
     assert gaps[found.uav, found.sample] == pytest.approx(gaps.min())
 

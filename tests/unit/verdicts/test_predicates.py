@@ -16,8 +16,8 @@ from volery.verdicts.judging import Judge
 EAST = line([0.0, 0.0, 3.0], [10.0, 0.0, 3.0], 101)
 
 
-def climbs(flight, least_m):
-    return float(flight.position_map[0, -1, 2]) - least_m
+def climbs(flight, min_height_m):
+    return float(flight.position_map[0, -1, 2]) - min_height_m
 
 
 def is_far(flight):
@@ -51,7 +51,7 @@ def verdict_on(*words, **keys):
 
 
 def test_a_number_is_a_margin_and_a_bool_has_none():
-    verdict = verdict_on("climbs", parameters={"least_m": 5.0})
+    verdict = verdict_on("climbs", parameters={"min_height_m": 5.0})
     assert (verdict.outcome, verdict.margin) == (Outcome.FAILED, -2.0)
     far = verdict_on("is_far")
     assert (far.is_passed, far.text) == (True, "true")

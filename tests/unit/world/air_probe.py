@@ -1,4 +1,4 @@
-"""The compiled air, asked from Python."""
+"""The compiled air, called from Python."""
 
 import numpy as np
 
@@ -14,21 +14,21 @@ FLAT = Terrain.flat(2000.0, 0.0, (-1000.0, -1000.0))
 
 
 @kernel
-def _ask(air, nodes, heights, x0, y0, spacing, turbulence, place, velocity, tick, period, out):
+def _ask(air, nodes, heights, x0, y0, spacing, turbulence, position, velocity, tick, period, out):
     grid = TerrainGrid(heights, x0, y0, spacing)
     for i in range(len(out)):
         out[i, 0], out[i, 1], out[i, 2] = air_velocity(
-            air[0], nodes, grid, turbulence[i], place[i], velocity[i], tick[i], period
+            air[0], nodes, grid, turbulence[i], position[i], velocity[i], tick[i], period
         )
 
 
 def air_at(
-    weather, place, *, tick=0, velocity=(0, 0, 0), terrain=FLAT, period=TICK_S, filters=None
+    weather, position, *, tick=0, velocity=(0, 0, 0), terrain=FLAT, period=TICK_S, filters=None
 ):
-    """Velocities (N, 3) at `place` (N, 3), all arguments broadcast."""
-    place = np.atleast_2d(np.asarray(place, float))
+    """Velocities (N, 3) at `position` (N, 3), all arguments broadcast."""
+    position = np.atleast_2d(np.asarray(position, float))
     tick = np.atleast_1d(np.asarray(tick, np.int64))
-    count = max(len(place), len(tick))
+    count = max(len(position), len(tick))
     if filters is None:
         filters = new_turbulence(0, [f"uav{i}" for i in range(count)])
     out = np.empty((count, 3))
@@ -37,7 +37,7 @@ def air_at(
         nodes_of(weather.field),
         *terrain.grid,
         filters,
-        np.array(np.broadcast_to(place, (count, 3))),
+        np.array(np.broadcast_to(position, (count, 3))),
         np.array(np.broadcast_to(np.asarray(velocity, float), (count, 3))),
         np.array(np.broadcast_to(tick, count)),
         period,

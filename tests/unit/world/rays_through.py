@@ -1,4 +1,4 @@
-"""Shares of parallel rays that pass a tree: the yardstick for levels of detail."""
+"""Fractions of parallel rays that pass a tree: the yardstick for levels of detail."""
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -30,7 +30,7 @@ def gap_fractions(model: TreeModel, level: DetailLevel, rays: int = 60) -> np.nd
     for elevation in ELEVATIONS:
         from_above = elevation > 1.5
         kept = across**2 + along**2 < 1 if from_above else np.full(len(across), True)
-        reach = radius if from_above else (high - low) / 2 * np.cos(elevation)
+        half_length = radius if from_above else (high - low) / 2 * np.cos(elevation)
         passed = []
         for azimuth in AZIMUTHS[:1] if from_above else AZIMUTHS:
             level_part = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -38,7 +38,7 @@ def gap_fractions(model: TreeModel, level: DetailLevel, rays: int = 60) -> np.nd
             right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
             up = np.cross(direction, right)
             origins = middle + np.outer(radius * across[kept], right) - 100.0 * direction
-            origins += np.outer(reach * along[kept], up)
+            origins += np.outer(half_length * along[kept], up)
             directions = np.tile(direction, (len(origins), 1)).astype(np.float32)
             passed.append((scene.run(origins.astype(np.float32), directions) < 0).mean())
         gaps.append(np.mean(passed))

@@ -55,11 +55,11 @@ def small_forest(count=25, extent=20.0, seed=0):
                 stem=np.array([[0.0, 0.15], [4.0, 0.15]]),
             )
         )
-    place = np.column_stack([rng.uniform(0.0, extent, (count, 2)), np.zeros(count)])
+    positions = np.column_stack([rng.uniform(0.0, extent, (count, 2)), np.zeros(count)])
     return Forest(
         models=tuple(models),
         model_index=rng.integers(0, 3, count).astype(np.int32),
-        position_map=place,
+        position_map=positions,
         yaw=rng.uniform(-np.pi, np.pi, count),
         scale=rng.uniform(0.6, 1.5, (count, 3)),
         dbh_m=np.full(count, 0.3),

@@ -1,4 +1,4 @@
-"""Things that move: shapes that are closed, ways by formula, and what rays see of them."""
+"""Actors: shapes that are closed, paths by formula, and what rays see of them."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_inside_of_a_person(point, inside):
 
 def test_loops_come_round():
     motion = WaypointMotion(SQUARE, 2.0, "loop", turn_m=0.5)
-    for time_s, place, heading in (
+    for time_s, position, heading in (
         (0.0, (0, 0), -45),  # turning into the corner
         (2.5, (5, 0), 0),
         (5.0, (10, 0), 45),
@@ -76,7 +76,7 @@ def test_loops_come_round():
         (1002.5, (5, 0), 0),
     ):
         pose = motion.pose_at(time_s)
-        np.testing.assert_allclose(pose[:3], [*place, 1.0], atol=1e-6)
+        np.testing.assert_allclose(pose[:3], [*position, 1.0], atol=1e-6)
         assert math.cos(math.radians(yaw(pose) - heading)) == pytest.approx(1.0, abs=1e-6)
     assert motion.speed_m_s == 2.0
 
@@ -118,8 +118,8 @@ def test_what_was_said_is_known_of_the_past():
     motion = GivenMotion([1, 2, 3, 0, 0, 0, 1])
     motion.set_pose(1.0, [5, 0, 0, 0, 0, 0, 1], [2, 0, 0])
     motion.set_pose(1.1, [9, 0, 0, 0, 0, 0, 1], [0, 0, 0])
-    places = [float(motion.pose_at(t)[0]) for t in (0.5, 1.0, 1.05, 1.1, 7.0)]
-    assert places == pytest.approx([1.0, 5.0, 5.1, 9.0, 9.0])
+    positions = [float(motion.pose_at(t)[0]) for t in (0.5, 1.0, 1.05, 1.1, 7.0)]
+    assert positions == pytest.approx([1.0, 5.0, 5.1, 9.0, 9.0])
     for k in range(1000):
         motion.set_pose(2.0 + 0.01 * k, [k, 0, 0, 0, 0, 0, 1], [0, 0, 0])
     assert len(motion._poses) < 40
@@ -162,8 +162,8 @@ def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
             assert scene.instance_name(int(hits.instance[1])) == "van"
             assert hits.material[1] == Material.RUBBER
             assert hits.distance[1] == pytest.approx(8.0 - 0.9, abs=1e-5)
-    nobody = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 50.0)
-    assert scene.instance_name(int(nobody.instance[0])) == "anna"
+    not_excluded = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 50.0)
+    assert scene.instance_name(int(not_excluded.instance[0])) == "anna"
     assert scene.occluded([[10.0, 0, 1.2]], [[4.0, 0, 1.2]], exclude=0)[0]
     scene.move_actors(0, 0)
     gone = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5)
@@ -178,7 +178,7 @@ def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
     scene.close()
 
 
-def test_actors_know_where_they_are_and_who_may_put_them():
+def test_actors_know_their_poses_and_which_of_them_topics_move():
     actors = two_actors()
     np.testing.assert_allclose(actors.velocity_at(0, 1_000_000_000), [0.0, 1.5, 0.0], atol=1e-6)
     actors.set_pose(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])

@@ -19,12 +19,12 @@ from volery.world.materials import Material
 from volery.world.scene import Scene, Solid
 
 
-def random_cells(seed=3, shape=(23, 31), share=0.4):
-    return np.random.default_rng(seed).random(shape) < share
+def random_cells(seed=3, shape=(23, 31), fraction=0.4):
+    return np.random.default_rng(seed).random(shape) < fraction
 
 
-def grid_of(cells, cell=2.0, height=5.0, **place):
-    return GridMap("g", cells, cell, height, **place)
+def grid_of(cells, cell=2.0, height=5.0, **options):
+    return GridMap("g", cells, cell, height, **options)
 
 
 def solid(grid, bottom=0.0):
@@ -37,10 +37,10 @@ def volume(mesh):
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-@pytest.mark.parametrize("place", [{}, {"origin_m": (-7.0, 11.0), "yaw_rad": 0.7}])
-def test_volume_and_walls_are_those_of_the_cells(place):
+@pytest.mark.parametrize("options", [{}, {"origin_m": (-7.0, 11.0), "yaw_rad": 0.7}])
+def test_volume_and_walls_are_those_of_the_cells(options):
     cells = random_cells()
-    grid = grid_of(cells, **place)
+    grid = grid_of(cells, **options)
     mesh = block_mesh(grid, 0.0, 5.0)
     assert volume(mesh) == pytest.approx(cells.sum() * 4.0 * 5.0, rel=1e-5)
     normal, area = (
@@ -60,11 +60,11 @@ def test_volume_and_walls_are_those_of_the_cells(place):
     assert area[~up].sum() == pytest.approx(edges * 2.0 * 5.0, rel=1e-5)
 
 
-def distance_by_cells(grid, origin, angle, reach):
+def distance_by_cells(grid, origin, angle, max_range):
     """Range of a level ray through the cells, by stepping along it."""
-    steps = np.arange(0.0, reach, 2e-4)
-    places = np.array(origin)[:2] + steps[:, None] * [math.cos(angle), math.sin(angle)]
-    inside = (places - grid.origin_m) / grid.cell_size_m
+    steps = np.arange(0.0, max_range, 2e-4)
+    points = np.array(origin)[:2] + steps[:, None] * [math.cos(angle), math.sin(angle)]
+    inside = (points - grid.origin_m) / grid.cell_size_m
     column, row = np.floor(inside).astype(int).T
     within = (column >= 0) & (row >= 0) & (column < grid.columns) & (row < grid.rows)
     hit = np.zeros(len(steps), bool)
@@ -73,7 +73,7 @@ def distance_by_cells(grid, origin, angle, reach):
 
 
 def test_rays_meet_the_cells_within_a_millimetre():
-    cells = random_cells(share=0.15)
+    cells = random_cells(fraction=0.15)
     cells[10:13, 14:17] = False
     grid = grid_of(cells, origin_m=(-30.0, -20.0))
     scene = Scene(None, None, solids=[solid(grid)])
@@ -100,8 +100,8 @@ def test_no_ray_slips_between_the_faces(yaw):
     scene = Scene(None, None, solids=[solid(grid)])
     corner = np.array([[x, y] for x in range(1, 12) for y in range(1, 12)], float)
     beside = [cells[int(y) - 1 : int(y) + 1, int(x) - 1 : int(x) + 1].all() for x, y in corner]
-    places = grid.map_from_cells(corner[beside])
-    o = np.column_stack([places, np.full(len(places), 8.0)])
+    points = grid.map_from_cells(corner[beside])
+    o = np.column_stack([points, np.full(len(points), 8.0)])
     hits = scene.cast(o, np.tile([0.0, 0.0, -1.0], (len(o), 1)), 20.0)
     np.testing.assert_allclose(hits.distance, 3.0, atol=1e-5)
     scene.close()

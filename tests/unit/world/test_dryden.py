@@ -26,7 +26,7 @@ def record(height, wind, level, ticks, period=TICK_S):
 
 
 def lengths_and_intensities(height_m, level):
-    """(Lu, Lw, su, sw) in m and m/s, written anew from the standard."""
+    """(Lu, Lw, su, sw) in m and m/s, written from the standard."""
     knots = {"light": 15, "moderate": 30, "severe": 45}[level]
     feet = min(max(height_m / 0.3048, 10.0), 1000.0)
     k = 0.177 + 0.000823 * feet
@@ -113,12 +113,12 @@ def test_the_longitudinal_axis_lies_along_the_wind():
 def test_a_turn_of_the_flight_does_not_make_the_air_jump():
     """Calm air, 5 m/s first east, then north, then back: increments stay those of a tick."""
     filters = new_turbulence(5, ["uav1"])
-    ways = np.repeat([[5.0, 0, 0], [0, 5, 0], [0, -5, 0], [-4, 3, 0]], 250, axis=0)
+    velocities = np.repeat([[5.0, 0, 0], [0, 5, 0], [0, -5, 0], [-4, 3, 0]], 250, axis=0)
     weather = Weather(w20_m_s=W20_M_S["severe"])
     air = np.array(
         [
             air_at(weather, [0, 0, 30], tick=[t], velocity=v, filters=filters)[0]
-            for t, v in enumerate(ways)
+            for t, v in enumerate(velocities)
         ]
     )
     lu, lw, su, sw = lengths_and_intensities(30.0, "severe")

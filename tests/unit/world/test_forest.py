@@ -158,11 +158,11 @@ def test_a_procedural_forest_keeps_its_spacing():
     for shift in range(1, 60):
         assert np.hypot(x[shift:] - x[:-shift], y[shift:] - y[:-shift]).min() >= 2.0
     assert x[60:].min() >= 0.0
-    shares = {name: forest.species.count(name) / 5000 for name in MIX}
-    assert shares == pytest.approx(MIX, abs=0.03)
+    fractions = {name: forest.species.count(name) / 5000 for name in MIX}
+    assert fractions == pytest.approx(MIX, abs=0.03)
 
 
-def test_density_and_equal_shares():
+def test_density_and_equal_fractions():
     forest = procedural_forest(
         (0.0, 0.0, 100.0, 50.0),
         species=["palm", "snag"],

@@ -53,16 +53,16 @@ def test_rays_in_the_file_agree_with_ours(world, tmp_path):
     read = loaded(glb_of(terrain, forest, solids, colours=base_colours()), tmp_path).to_mesh()
     rng = np.random.default_rng(1)
     origins = np.column_stack([rng.uniform(-20, 20, (400, 2)), rng.uniform(20, 30, 400)])
-    ways = rng.normal(size=(400, 3)) * [1.0, 1.0, 0.3] - [0.0, 0.0, 0.4]
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    directions = rng.normal(size=(400, 3)) * [1.0, 1.0, 0.3] - [0.0, 0.0, 0.4]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     scene = Scene(terrain, forest, solids=solids, detail=DetailLevel.SENSING)
-    ours = scene.cast(origins, ways, 200.0).distance.astype(float)
+    ours = scene.cast(origins, directions, 200.0).distance.astype(float)
     scene.close()
     theirs = np.full(400, np.inf)
-    places, rays, _ = read.ray.intersects_location(
-        gltf_from_enu(origins), gltf_from_enu(ways), multiple_hits=False
+    points, rays, _ = read.ray.intersects_location(
+        gltf_from_enu(origins), gltf_from_enu(directions), multiple_hits=False
     )
-    theirs[rays] = np.linalg.norm(enu_from_gltf(places) - origins[rays], axis=1)
+    theirs[rays] = np.linalg.norm(enu_from_gltf(points) - origins[rays], axis=1)
     hit = np.isfinite(ours)
     assert hit.sum() > 100
     same = np.isclose(ours[hit], theirs[hit], atol=2e-3)
@@ -100,15 +100,15 @@ def test_north_is_minus_z_and_up_is_y(world, tmp_path):
     assert high[1] == pytest.approx(float(np.asarray(terrain.grid.heights).max()), abs=1e-4)
 
 
-def test_streets_lie_over_the_ground_as_a_picture(world, tmp_path):
-    """A point of the ground has, in the picture, the colour of its cell, and earth beyond."""
+def test_streets_lie_over_the_ground_as_an_image(world, tmp_path):
+    """A point of the ground has, in the image, the colour of its cell, and earth beyond."""
     terrain, _, _ = world
     cells = np.array([[Material.ASPHALT, Material.PAVING], [Material.PAVING, Material.ASPHALT]])
     cover = GroundCover(cells.astype(np.uint8), -10.0, -20.0, 10.0)
     content = glb_of(terrain, None, colours=base_colours(), cover=cover)
     (mesh,) = loaded(content, tmp_path).geometry.values()
-    picture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), float)
-    places = np.asarray(mesh.visual.uv)
+    image = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), float)
+    uv = np.asarray(mesh.visual.uv)
     points = enu_from_gltf(mesh.vertices)
     for x, y, wanted in (
         (-6.0, -12.0, Material.ASPHALT),
@@ -117,8 +117,8 @@ def test_streets_lie_over_the_ground_as_a_picture(world, tmp_path):
         (18.0, 6.0, Material.GROUND),
     ):
         row = np.argmin(np.linalg.norm(points[:, :2] - (x, y), axis=1))
-        u, v = places[row].clip(0.0, 0.999)  # trimesh counts v from below
-        pixel = picture[int((1.0 - v) * len(picture)), int(u * picture.shape[1])] / 255.0
+        u, v = uv[row].clip(0.0, 0.999)  # trimesh counts v from below
+        pixel = image[int((1.0 - v) * len(image)), int(u * image.shape[1])] / 255.0
         linear = np.where(pixel <= 0.04045, pixel / 12.92, ((pixel + 0.055) / 1.055) ** 2.4)
         np.testing.assert_allclose(linear, base_colours()[wanted], atol=0.01)
 

@@ -60,14 +60,14 @@ def test_a_tree_of_nodes_as_trimesh_reads_it(tmp_path):
     rng = np.random.default_rng(3)
     above = None
     for k, scale in enumerate((1.0, 2.0, -0.5)):
-        place = trimesh.transformations.random_rotation_matrix(rng.random(3)) * scale
-        place[3, 3] = 1.0
-        place[:3, 3] = rng.normal(size=3)
+        transform = trimesh.transformations.random_rotation_matrix(rng.random(3)) * scale
+        transform[3, 3] = 1.0
+        transform[:3, 3] = rng.normal(size=3)
         above = scene.add_geometry(
             trimesh.creation.icosphere(1),
             node_name=f"n{k}",
             parent_node_name=above,
-            transform=place,
+            transform=transform,
         )
     path = tmp_path / "a.glb"
     path.write_bytes(scene.export(file_type="glb"))
@@ -95,7 +95,7 @@ def test_lists_strips_and_fans(parts_of):
     assert part.triangles.tolist() == [[0, 1, 2]]
 
 
-def test_sparse_strided_and_integer_places(parts_of):
+def test_sparse_strided_and_integer_positions(parts_of):
     """KHR_mesh_quantization's shares, four bytes apart; then one of them replaced."""
     data = np.array([[0, 0, 0, 9], [127, 0, 0, 9], [0, -127, 0, 9], [1, 2, 3, 9]], np.int8)
     content = document(SQUARE[:3])
@@ -163,13 +163,13 @@ def lie(content, key, number, **lies):
         (document(SQUARE, asset={"version": "1.0"}), "glTF 2 is read"),
     ],
 )
-def test_lies_are_told(parts_of, content, message):
+def test_wrong_declarations_are_reported(parts_of, content, message):
     with pytest.raises(ValueError, match=message):
         parts_of(content)
 
 
 def test_shapes_shown_too_often(tmp_path, parts_of, monkeypatch):
-    monkeypatch.setattr(gltf_import, "MOST_PARTS", 10)
+    monkeypatch.setattr(gltf_import, "MAX_PARTS", 10)
     content = document(SQUARE[:3])
     content["nodes"] = [{"mesh": 0}] * 11
     content["scenes"] = [{"nodes": list(range(11))}]
@@ -180,7 +180,7 @@ def test_shapes_shown_too_often(tmp_path, parts_of, monkeypatch):
     assert len(parts_of(deep)) == 1
 
 
-def test_pictures_are_never_opened(tmp_path):
+def test_images_are_never_opened(tmp_path):
     """A PNG that says it has 4,295 million pixels does not matter: textures are left out."""
     size = struct.pack(">II", 65535, 65535)
     bomb = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4s", 13, b"IHDR") + size + bytes(9)

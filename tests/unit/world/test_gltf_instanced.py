@@ -1,4 +1,4 @@
-"""Worlds as few nodes with many places, held against the file with one node a tree."""
+"""Worlds as few nodes with many instances, held against the file with one node a tree."""
 
 import json
 import struct
@@ -103,7 +103,7 @@ def test_every_tree_stands_where_its_own_node_would(world, read):
     np.testing.assert_allclose(sorted(ours), sorted(theirs), atol=1e-4)
 
 
-def test_who_does_not_know_of_instancing_is_told(read):
+def test_readers_without_instancing_are_refused(read):
     for key in ("extensionsUsed", "extensionsRequired"):
         assert read.json[key] == ["EXT_mesh_gpu_instancing"]
     assert read.json["asset"]["extras"] == {"kind": "forest"}

@@ -98,9 +98,9 @@ def test_morph_targets_have_their_default_weights(corners_of, mesh, node, expect
 
 
 def test_targets_of_integers_sparse_ones_and_none(corners_of):
-    shares = np.array([[127, 0, 0], [0, -127, 0], [0, 0, 0]], np.int8)
+    offsets = np.array([[127, 0, 0], [0, -127, 0], [0, 0, 0]], np.int8)
     targets = [{"POSITION": 1}, {"NORMAL": 1}, {"POSITION": 3}]
-    content = document(TRIANGLE, shares, np.array([2], np.uint8), targets=targets)
+    content = document(TRIANGLE, offsets, np.array([2], np.uint8), targets=targets)
     content["accessors"].append({"componentType": 5126, "count": 3, "type": "VEC3"})
     content["meshes"][0]["weights"] = [2.0, 1.0, 1.0]
     expected = moved(TRIANGLE, [2, 0, 0], [0, -2, 0], [0, 0, 0])
@@ -177,11 +177,11 @@ CHILD = TRIANGLE * 2 + [100, 0, 18]
 
 def test_instances_have_their_positions_rotations_and_scales(corners_of):
     """Each is scaled, rotated and moved, then placed as the node; the child is no instance."""
-    places = np.array([[0, 0, 0], [10, 0, 0], [0, 20, 0]], "<f4")
+    translations = np.array([[0, 0, 0], [10, 0, 0], [0, 20, 0]], "<f4")
     turns = np.array([[0, 0, 0, 1], [0, 0, HALF, HALF], [0, 0, 0, 1]], "<f4")
     scales = np.array([[1, 1, 1], [3, 3, 3], [-1, 1, 1]], "<f4")
     for turn in (turns, np.round(turns * 127).astype(np.int8)):
-        content = instanced(places, turn, scales, TRANSLATION=1, ROTATION=2, SCALE=3)
+        content = instanced(translations, turn, scales, TRANSLATION=1, ROTATION=2, SCALE=3)
         turned = moved([[0, 0, 0], [0, 3, 0], [-3, 0, 0]], 10, 0, 0)
         mirrored = moved([[0, 1, 0], [-1, 0, 0], [0, 0, 0]], 0, 20, 0)
         expected = [TRIANGLE * 2, turned * 2, mirrored * 2]
@@ -193,28 +193,28 @@ def test_instances_have_their_positions_rotations_and_scales(corners_of):
 
 
 def test_instances_of_one_attribute_and_none(corners_of):
-    places = np.array([[0, 0, 1], [0, 0, 2]], "<f4")
-    found = corners_of(instanced(places, TRANSLATION=1))
+    translations = np.array([[0, 0, 1], [0, 0, 2]], "<f4")
+    found = corners_of(instanced(translations, TRANSLATION=1))
     assert found[:, 0, 2].tolist() == [2.0, 4.0, 18.0]
     found = corners_of(instanced(np.arange(4, dtype="<f4"), _ID=1))
     np.testing.assert_allclose(found, [*4 * [TRIANGLE * 2 + [100, 0, 0]], CHILD])
-    assert len(corners_of(instanced(places[:0], TRANSLATION=1))) == 1
+    assert len(corners_of(instanced(translations[:0], TRANSLATION=1))) == 1
     assert len(corners_of(instanced())) == 2
 
 
 def test_instances_that_do_not_fit(corners_of, monkeypatch):
-    places, turns = np.zeros((2, 3), "<f4"), np.zeros((3, 4), "<f4")
+    translations, turns = np.zeros((2, 3), "<f4"), np.zeros((3, 4), "<f4")
     with pytest.raises(ValueError, match=r"have \[2, 3\] elements"):
-        corners_of(instanced(places, turns, TRANSLATION=1, ROTATION=2))
+        corners_of(instanced(translations, turns, TRANSLATION=1, ROTATION=2))
     with pytest.raises(ValueError, match="'rotation' is zero"):
-        corners_of(instanced(places, turns[:2], TRANSLATION=1, ROTATION=2))
-    content = instanced(places, TRANSLATION=1)
+        corners_of(instanced(translations, turns[:2], TRANSLATION=1, ROTATION=2))
+    content = instanced(translations, TRANSLATION=1)
     content["accessors"][1]["count"] = 10**9
     with pytest.raises(ValueError, match="at most 1,000,000"):
         corners_of(content)
-    monkeypatch.setattr(gltf_import, "MOST_INSTANCES", 2)
+    monkeypatch.setattr(gltf_import, "MAX_INSTANCES", 2)
     with pytest.raises(ValueError, match="or 2 instances"):
-        corners_of(instanced(places, TRANSLATION=1))
+        corners_of(instanced(translations, TRANSLATION=1))
 
 
 def test_an_instance_has_no_vertices_of_the_next(corners_of):
@@ -248,7 +248,7 @@ def test_the_own_exports_with_and_without_instances_agree(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.gltf", "a.glb", "A.GLB"])
 @pytest.mark.parametrize("kind", ["text", "binary", "utf-8-sig", "utf-16"])
-def test_the_content_tells_text_from_binary(tmp_path, name, kind):
+def test_the_content_distinguishes_text_from_binary(tmp_path, name, kind):
     path = tmp_path / name
     if kind == "binary":
         path.write_bytes(glb_of(None, None, (TANK,), colours=base_colours()))

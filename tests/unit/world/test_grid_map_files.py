@@ -11,7 +11,7 @@ from PIL import Image
 from volery.core.errors import CommandError, DataFileError
 from volery.scenario.access import SHIPPED_DATA
 from volery.world.grid_maps import GridMap, read_cells
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 from volery.world.grid_maps.parsing import parse_cells
 
 PATTERN = np.array([[1, 0, 0, 1], [0, 0, 1, 0], [1, 1, 0, 0]], dtype=bool)
@@ -34,19 +34,19 @@ def as_map(pattern):
 
 def as_png(pattern, mode="L"):
     grey = np.where(from_top(pattern), 0, 255).astype(np.uint8)
-    picture = Image.fromarray(grey)
+    image = Image.fromarray(grey)
     if mode == "I;16":
-        picture = Image.fromarray(grey.astype(np.uint16) * 257)
+        image = Image.fromarray(grey.astype(np.uint16) * 257)
     elif mode == "P":
-        picture = picture.convert("RGB").quantize(2)
+        image = image.convert("RGB").quantize(2)
     elif mode == "alpha":  # all black, free where one sees through
         both = np.zeros((*grey.shape, 4), np.uint8)
         both[:, :, 3] = 255 - grey
-        picture = Image.fromarray(both)
+        image = Image.fromarray(both)
     elif mode != "L":
-        picture = picture.convert(mode)
+        image = image.convert(mode)
     buffer = io.BytesIO()
-    picture.save(buffer, format="PNG")
+    image.save(buffer, format="PNG")
     return buffer.getvalue()
 
 
@@ -83,7 +83,7 @@ def test_matrices_are_read_from_the_top(text):
 
 
 @pytest.mark.parametrize("mode", ["L", "1", "P", "RGB", "RGBA", "LA", "I;16", "alpha"])
-def test_pictures_of_every_kind_are_read_from_the_top(mode):
+def test_images_of_every_kind_are_read_from_the_top(mode):
     np.testing.assert_array_equal(parse_cells(as_png(PATTERN, mode), ".png", "x.png"), PATTERN)
 
 
@@ -156,7 +156,7 @@ def test_broken_moving_ai_maps_are_refused(data, words):
     refused(data, ".map", *words)
 
 
-def test_broken_pictures_are_refused():
+def test_broken_images_are_refused():
     good = as_png(PATTERN)
     refused(b"", ".png", "not a PNG")
     refused(b"GIF89a" + good, ".png", "not a PNG")
@@ -192,7 +192,7 @@ def test_sizes_that_cannot_be_are_refused():
     for wrong in (
         {"blocked": np.zeros((0, 3), bool)},
         {"blocked": np.zeros(3, bool)},
-        {"blocked": np.broadcast_to(False, (1, MOST_CELLS + 1))},
+        {"blocked": np.broadcast_to(False, (1, MAX_CELLS + 1))},
         {"cell_size_m": 0.0},
         {"cell_size_m": float("nan")},
         {"block_height_m": -1.0},

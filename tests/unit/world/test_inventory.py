@@ -101,7 +101,7 @@ def test_feet_are_metres(tmp_path):
         ("x_m,y_m,dbh_cm,DBH (in)\n1,2,3,4\n", "column 'dbh_cm' occurs twice"),
     ],
 )  # fmt: skip
-def test_what_could_be_read_in_two_ways_is_refused(tmp_path, text, message):
+def test_ambiguous_files_are_refused(tmp_path, text, message):
     with pytest.raises(DataFileError) as caught:
         read_inventory(write(tmp_path, text))
     assert message in str(caught.value)
@@ -149,7 +149,7 @@ def test_every_bad_row_is_listed_in_one_error(tmp_path):
         assert part in message
 
 
-def test_beyond_twenty_bad_rows_only_their_numbers_are_told(tmp_path):
+def test_beyond_twenty_bad_rows_only_their_numbers_are_reported(tmp_path):
     with pytest.raises(
         DataFileError, match=r"has 50 bad rows: row 2: .*row 21: .*; and rows 22, 23, .*, 51$"
     ):

@@ -11,7 +11,7 @@ from volery.world import magnetic_field
 from volery.world.magnetic_field import angles_of_field, field_enu, field_of_angles
 
 RADIUS = 6_371_200.0
-PLACES = [
+LOCATIONS = [
     (47.397742, 8.545594, 488.0),
     (-33.9, 151.2, 20.0),
     (71.0, -156.0, 0.0),
@@ -33,9 +33,9 @@ def potential(ecef):
     return total
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_field_is_the_gradient_of_the_series(place):
-    frame = LocalFrame.from_degrees(*place)
+@pytest.mark.parametrize("location", LOCATIONS)
+def test_field_is_the_gradient_of_the_series(location):
+    frame = LocalFrame.from_degrees(*location)
     at = ecef_from_geodetic(frame.origin_geodetic)
     step = 200.0
     gradient = [(potential(at + d) - potential(at - d)) / (2 * step) for d in np.eye(3) * step]
@@ -47,8 +47,8 @@ def test_dipole_alone_is_the_dipole(monkeypatch):
     table = magnetic_field._coefficients()[:2]
     monkeypatch.setattr(magnetic_field, "_coefficients", lambda: table)
     moment = np.array([-1410.3, 4545.5, -29350.0]) * 1e-9
-    for place in PLACES:
-        frame = LocalFrame.from_degrees(*place)
+    for location in LOCATIONS:
+        frame = LocalFrame.from_degrees(*location)
         at = ecef_from_geodetic(frame.origin_geodetic)
         r = np.linalg.norm(at)
         out = at / r
@@ -65,7 +65,7 @@ def test_field_is_that_of_the_world_magnetic_model():
 
 
 def test_angles_and_back():
-    field = field_enu(LocalFrame.from_degrees(*PLACES[0]))
+    field = field_enu(LocalFrame.from_degrees(*LOCATIONS[0]))
     np.testing.assert_allclose(field_of_angles(*angles_of_field(field)), field, atol=1e-18)
     east_and_down = field_of_angles(math.radians(90.0), math.radians(30.0), 2.0)
     np.testing.assert_allclose(east_and_down, [2 * math.cos(math.pi / 6), 0, -1.0], atol=1e-15)

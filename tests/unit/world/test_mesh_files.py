@@ -75,7 +75,7 @@ def scenario_with(path, **settings):
     )
 
 
-def test_place_turn_and_scale(box_file):
+def test_position_rotation_and_scale(box_file):
     """Scaled by 2, a quarter turn to the left, at (10, 20, 1); rays meet it there."""
     scenario = scenario_with(
         box_file("box.stl"),
@@ -151,7 +151,7 @@ def test_truncated_glb_at_every_length(box_file):
 
 def test_a_small_file_that_draws_millions_of_triangles(tmp_path, box_file, monkeypatch):
     """Nodes may share a mesh: they are counted before they are copied."""
-    monkeypatch.setattr(mesh_files, "MOST_TRIANGLES", 1000)
+    monkeypatch.setattr(mesh_files, "MAX_TRIANGLES", 1000)
     content = json.loads(box_file("box.gltf").read_text())
     mesh = next(node["mesh"] for node in content["nodes"] if "mesh" in node)
     content["nodes"] = [{"mesh": mesh, "name": f"n{k}"} for k in range(100)]

@@ -13,11 +13,11 @@ def area_of(points, triangles):
     return np.cross(b - a, c - a).sum(axis=0) / 2.0
 
 
-def covered(ring, **placing):
+def covered(ring, **options):
     """The triangles of one polygon (n, 2) that stands anywhere in space."""
     ring = np.asarray(ring, dtype=float)
-    turn = np.linalg.qr(np.random.default_rng(placing.pop("seed", 0)).normal(size=(3, 3)))[0]
-    points = np.pad(ring, ((0, 0), (0, 1))) @ turn.T + placing.pop("at", 0.0)
+    turn = np.linalg.qr(np.random.default_rng(options.pop("seed", 0)).normal(size=(3, 3)))[0]
+    points = np.pad(ring, ((0, 0), (0, 1))) @ turn.T + options.pop("at", 0.0)
     rows, owner = triangulated(points, np.arange(len(ring)), np.array([len(ring)]))
     assert owner.tolist() == [0] * (len(ring) - 2)
     return ring, points, rows
@@ -90,7 +90,7 @@ def test_crossing_and_flat_polygons_end_with_triangles():
 
 
 def test_a_huge_concave_polygon_is_refused_and_a_convex_one_read(monkeypatch):
-    monkeypatch.setattr(polygons, "MOST_CORNERS", 7)
+    monkeypatch.setattr(polygons, "MAX_CORNERS", 7)
     with pytest.raises(ValueError, match="not convex has 8 corners"):
         covered(NOTCH)
     angles = np.arange(9) * 2.0 * np.pi / 9.0

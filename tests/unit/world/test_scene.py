@@ -96,16 +96,16 @@ def test_occlusion_means_that_the_cast_ends_before_the_target(scenes):
 def test_clearance_is_exact_against_every_triangle(scenes):
     main, plain, _ = scenes
     points = np.random.default_rng(9).uniform([-2, -2, -1], [22, 22, 9], (400, 3))
-    for reach in (0.5, 4.0, np.inf):
-        found = main.clearance(points, reach)
+    for radius in (0.5, 4.0, np.inf):
+        found = main.clearance(points, radius)
         true = np.empty(400), np.empty((400, 3)), np.empty(400, np.int32)
-        plain.backend.clearance(points, reach, True, true)
+        plain.backend.clearance(points, radius, True, true)
         np.testing.assert_allclose(found.distance, true[0], atol=1e-9)
         np.testing.assert_allclose(found.nearest, true[1], atol=1e-6)
         seen = found.instance >= 0
         gap = np.linalg.norm(found.nearest - points, axis=1)
         np.testing.assert_allclose(gap[seen], found.distance[seen], atol=1e-9)
-        np.testing.assert_array_equal(found.distance[~seen], reach)
+        np.testing.assert_array_equal(found.distance[~seen], radius)
 
 
 def test_clearance_to_a_cylinder_and_to_the_ground_by_formula():

@@ -60,15 +60,15 @@ def test_materials_of_tops_sides_and_ground(scene_class):
     solid = Solid(cube(), Material.FACADE, "cube", top=Material.ROOF)
     terrain = Terrain.flat(40.0, origin=(-20.0, -20.0))
     scene = scene_class(terrain, None, solids=[solid], cover=cover)
-    places = [
+    origins = [
         [1.0, 0.7, 9.0],
         [-2.0, -2.0, 9.0],
         [3.0, -2.0, 9.0],
         [9.0, 9.0, 9.0],
         [-9.0, 1.0, 0.5],
     ]
-    ways = [[0.0, 0.0, -1.0]] * 4 + [[1.0, 0.0, 0.0]]
-    hits = scene.cast(places, ways, 50.0)
+    directions = [[0.0, 0.0, -1.0]] * 4 + [[1.0, 0.0, 0.0]]
+    hits = scene.cast(origins, directions, 50.0)
     assert hits.material.tolist() == [
         Material.ROOF,
         Material.ASPHALT,

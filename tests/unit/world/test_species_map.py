@@ -71,7 +71,7 @@ def test_a_map_says_which_shipped_species_they_are(forest_of, caplog):
     assert not caplog.records
 
 
-def test_names_in_the_map_that_no_tree_has_are_told(forest_of, caplog):
+def test_names_in_the_map_that_no_tree_has_are_reported(forest_of, caplog):
     forest_of('[world.forest.species_map]\n"Querqus alba" = "snag"\n', ["conifer"])
     assert [record.getMessage() for record in caplog.records] == [
         "inventory oaks.csv: no tree is of the species Querqus alba in [world.forest.species_map]"

@@ -115,7 +115,7 @@ def test_a_tag_in_a_scene_is_seen_where_it_lies():
     terrain = build_terrain(world)
     scene = build_scene(world, terrain, None)
     scene.move_actors(0, 0)
-    # yaw 90 degrees: the picture's top, its x, points along y of the map
+    # yaw 90 degrees: the image's top, its x, points along y of the map
     down = [[0.0, 0.0, -1.0]] * 3
     hits = scene.cast([[1.0, 2.45, 2.0], [1.0, 2.35, 2.0], [1.0, 2.6, 2.0]], down, 5.0)
     assert hits.material.tolist() == [Material.PRINT_WHITE, Material.PRINT_BLACK, Material.GROUND]

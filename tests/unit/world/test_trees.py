@@ -68,9 +68,9 @@ def test_crowns_have_the_width_of_the_law(name):
     species = load_species(name)
     for model in grow_models(species, seed=5):
         leaves = model.levels[DetailLevel.VISUAL].leaves.vertices[:, :2]
-        reach = np.linalg.norm(leaves - np.median(leaves, axis=0), axis=1)
+        radii = np.linalg.norm(leaves - np.median(leaves, axis=0), axis=1)
         law = species.crown_width.radius(model.dbh_m)
-        assert 0.6 * law < np.percentile(reach, 90) < 1.5 * law
+        assert 0.6 * law < np.percentile(radii, 90) < 1.5 * law
 
 
 @pytest.mark.parametrize("name", LEAFY)

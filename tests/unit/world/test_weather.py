@@ -13,19 +13,19 @@ SLOPE = Terrain.from_heights([[0.0, 30.0], [0.0, 30.0]], 100.0)
 
 
 def test_steady_wind_is_the_same_everywhere():
-    places = np.random.default_rng(0).uniform(-500, 500, (20, 3))
+    positions = np.random.default_rng(0).uniform(-500, 500, (20, 3))
     np.testing.assert_array_equal(
-        air_at(Weather((3, -2, 0.5)), places), np.tile([3, -2, 0.5], (20, 1))
+        air_at(Weather((3, -2, 0.5)), positions), np.tile([3, -2, 0.5], (20, 1))
     )
-    assert not air_at(CALM, places).any()
+    assert not air_at(CALM, positions).any()
 
 
 @pytest.mark.parametrize("height", [0.02, 0.03, 0.5, 10.0, 120.0, 304.8])
 def test_log_profile_counts_from_the_ground(height):
     wind = Weather((6, 3, -1), LogProfile(reference_height_m=10.0, roughness_m=0.03))
-    share = max(np.log(height / 0.03), 0.0) / np.log(10.0 / 0.03)
+    factor = max(np.log(height / 0.03), 0.0) / np.log(10.0 / 0.03)
     got = air_at(wind, [40.0, 50.0, 12.0 + height], terrain=SLOPE)
-    np.testing.assert_allclose(got[0], share * np.array([6, 3, -1]), atol=1e-12)
+    np.testing.assert_allclose(got[0], factor * np.array([6, 3, -1]), atol=1e-12)
 
 
 @pytest.mark.parametrize("height", [0.0, 2.0, 10.0, 304.8])
@@ -47,37 +47,39 @@ def test_profiles_end_at_the_ground_and_at_1000_feet(profile):
 # ------------------------------------------------------------------------------------------ fields
 
 
-def linear(places):
-    x, y, z = np.asarray(places, float).T
+def linear(positions):
+    x, y, z = np.asarray(positions, float).T
     return np.stack([1 + 0.02 * x - 0.01 * y + 0.1 * z, 0.03 * y - 2, 0.05 * z - 0.01 * x], axis=-1)
 
 
 def field_of(function, shape=(4, 5, 6), origin=(-20.0, 10.0, 0.0), spacing=(10.0, 20.0, 5.0)):
     k, j, i = np.indices(shape)
-    places = np.stack([i, j, k], axis=-1) * spacing + origin
-    return WindField(function(places.reshape(-1, 3)).reshape(*shape, 3), origin, spacing)
+    positions = np.stack([i, j, k], axis=-1) * spacing + origin
+    return WindField(function(positions.reshape(-1, 3)).reshape(*shape, 3), origin, spacing)
 
 
 def test_a_linear_field_is_met_exactly():
-    places = np.random.default_rng(1).uniform([-20, 10, 0], [30, 90, 15], (200, 3))
-    got = air_at(Weather(field=field_of(linear)), places)
-    np.testing.assert_allclose(got, linear(places), atol=1e-12)
+    positions = np.random.default_rng(1).uniform([-20, 10, 0], [30, 90, 15], (200, 3))
+    got = air_at(Weather(field=field_of(linear)), positions)
+    np.testing.assert_allclose(got, linear(positions), atol=1e-12)
 
 
 def test_a_trilinear_field_is_met_exactly_within_a_cell():
-    def product(places):
-        x, y, z = places.T
+    def product(positions):
+        x, y, z = positions.T
         return np.stack([x * y * z, x * y, y * z], axis=-1)
 
     cube = field_of(product, (2, 2, 2), (0.0, 0.0, 0.0), (2.0, 3.0, 4.0))
-    places = np.random.default_rng(2).uniform(0, [2, 3, 4], (50, 3))
-    np.testing.assert_allclose(air_at(Weather(field=cube), places), product(places), atol=1e-12)
+    positions = np.random.default_rng(2).uniform(0, [2, 3, 4], (50, 3))
+    np.testing.assert_allclose(
+        air_at(Weather(field=cube), positions), product(positions), atol=1e-12
+    )
 
 
 def test_a_field_is_clamped_at_its_border():
-    places = np.random.default_rng(3).uniform(-200, 200, (200, 3))
-    got = air_at(Weather(field=field_of(linear)), places)
-    inside = np.clip(places, [-20, 10, 0], [30, 90, 15])
+    positions = np.random.default_rng(3).uniform(-200, 200, (200, 3))
+    got = air_at(Weather(field=field_of(linear)), positions)
+    inside = np.clip(positions, [-20, 10, 0], [30, 90, 15])
     np.testing.assert_allclose(got, linear(inside), atol=1e-12)
 
 
@@ -116,8 +118,8 @@ def test_gusts_and_wind_add_up():
     np.testing.assert_allclose(both, parts[0] + parts[1] + [2, 0, 0], atol=1e-12)
 
 
-def test_a_front_reaches_places_one_after_the_other():
-    """5 m/s: 25 m along its way it is 5 s = 625 ticks late, across its way it is on time."""
+def test_a_front_reaches_positions_one_after_the_other():
+    """5 m/s: 25 m downwind it is 5 s = 625 ticks late, across the wind it is on time."""
     front = Weather(gusts=(Gust((4, 0, 0), 1.0, 0.8, 3.0, front_velocity_map=(3, 4, 0)),))
     tick = np.arange(400)
     here = air_at(front, [0, 0, 7], tick=tick)

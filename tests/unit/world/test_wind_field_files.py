@@ -90,7 +90,7 @@ def test_rounded_coordinates_pass(tmp_path):
         ({1: "0,5,3,?,0,0", 7: "0,0,0,0,0,-99"}, ["row 3", "row 9"]),
     ],
 )
-def test_bad_rows_are_told(tmp_path, change, words):
+def test_bad_rows_are_reported(tmp_path, change, words):
     rows = [change.get(k, row) for k, row in enumerate(ROWS)]
     with pytest.raises(DataFileError) as error:
         WindField.from_file(written(tmp_path, rows))
@@ -114,7 +114,7 @@ def test_bad_rows_are_told(tmp_path, change, words):
         ([f"{k},{k},{k},1,0,0" for k in range(3000)], HEADING, "3000 of the 27000000000 nodes"),
     ],
 )
-def test_bad_tables_are_told(tmp_path, rows, heading, words):
+def test_bad_tables_are_reported(tmp_path, rows, heading, words):
     with pytest.raises(DataFileError, match=words):
         WindField.from_file(written(tmp_path, rows, heading))
 
@@ -157,12 +157,12 @@ def test_npz_holds_the_same(tmp_path):
         ({"velocity_m_s": np.array([{}])}, "cannot be read"),
     ],
 )
-def test_bad_archives_are_told(tmp_path, changes, words):
+def test_bad_archives_are_reported(tmp_path, changes, words):
     with pytest.raises(DataFileError, match=words):
         WindField.from_file(archive(tmp_path, **changes))
 
 
-def test_a_broken_archive_is_told(tmp_path):
+def test_a_broken_archive_is_reported(tmp_path):
     path = tmp_path / "wind.npz"
     path.write_bytes(b"PK\x03\x04 and nothing else")
     with pytest.raises(DataFileError, match=r"wind\.npz cannot be read"):

@@ -1,5 +1,5 @@
 import type { KeyboardEvent, PointerEvent } from "react";
-import { LEAST_SIZE, resizeDock, useLayout, type Dock } from "../state/layout.ts";
+import { MIN_SIZE, resizeDock, useLayout, type Dock } from "../state/layout.ts";
 
 const STEP_PX = 24;
 
@@ -28,7 +28,7 @@ export function DockEdge({ dock, title }: { dock: Dock; title: string }) {
       aria-label={`Size of ${title}`}
       aria-orientation={upright ? "vertical" : "horizontal"}
       aria-valuenow={size}
-      aria-valuemin={LEAST_SIZE[dock]}
+      aria-valuemin={MIN_SIZE[dock]}
       onPointerDown={(event) => event.currentTarget.setPointerCapture(event.pointerId)}
       onPointerMove={drag}
       onKeyDown={key}

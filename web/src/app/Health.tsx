@@ -5,7 +5,7 @@ import { useHealth } from "../state/health.ts";
 import { useSimulation } from "../state/simulation.ts";
 import classes from "./Health.module.css";
 
-/** Beyond this a person feels that the picture lags, ms. */
+/** Beyond this a person feels that the view lags, ms. */
 const OLD_MS = 100;
 const VERY_OLD_MS = 300;
 

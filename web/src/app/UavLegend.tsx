@@ -2,7 +2,7 @@ import { uavColour, type Colouring } from "../lib/uavColours.ts";
 import { useColouring } from "../state/colouring.ts";
 import { useVehicles } from "../state/vehicles.ts";
 
-const MOST_TYPES = 8;
+const MAX_TYPES = 8;
 
 /** What the colours of UAVs mean; nothing while each has its own one. */
 export function UavLegend() {
@@ -32,10 +32,10 @@ function Scale({ by, top }: { by: Exclude<Colouring, "uav" | "type">; top: numbe
 }
 
 function Types({ types }: { types: readonly string[] }) {
-  const left = types.length - MOST_TYPES;
+  const left = types.length - MAX_TYPES;
   return (
     <>
-      {types.slice(0, MOST_TYPES).map((type) => (
+      {types.slice(0, MAX_TYPES).map((type) => (
         <span key={type}>
           <span className="legend-dot" style={{ background: cssOf(type, types) }} aria-hidden />
           {type}

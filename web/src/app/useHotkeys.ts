@@ -23,8 +23,8 @@ import { openWindow, useWindows } from "../state/windows.ts";
 const COMMANDS: Readonly<Record<string, () => void>> = {
   " ": () => command("Play, pause", setPlaying(useSimulation.getState().status?.state !== PLAYING)),
   ".": () => command("Step", step(1)),
-  "+": () => pace(true),
-  "-": () => pace(false),
+  "+": () => changeSpeed(true),
+  "-": () => changeSpeed(false),
   t: () => order("take_off"),
   h: () => order("hold"),
   l: () => order("land"),
@@ -88,7 +88,7 @@ function order(what: FlightCommand): void {
   if (uavs.length > 0) void commandAll(commandText(what), uavs, (uav) => sendCommand(uav, what));
 }
 
-function pace(up: boolean): void {
+function changeSpeed(up: boolean): void {
   const wanted = useSimulation.getState().status?.speed ?? 1;
   command("Speed", setSpeed(nextMark(wanted, up)));
 }

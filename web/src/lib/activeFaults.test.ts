@@ -2,8 +2,8 @@ import { expect, test } from "vitest";
 import { activeFaultsOf, faultText } from "./activeFaults.ts";
 
 test("active faults come as JSON, and anything else is none", () => {
-  const told = [{ kind: "motor", uav: "uav1", at_s: 2, rotor: 3, thrust_factor: 0.25 }];
-  expect(activeFaultsOf(JSON.stringify(told))).toEqual(told);
+  const faults = [{ kind: "motor", uav: "uav1", at_s: 2, rotor: 3, thrust_factor: 0.25 }];
+  expect(activeFaultsOf(JSON.stringify(faults))).toEqual(faults);
   for (const text of ["", "{", "{}", "null"]) expect(activeFaultsOf(text)).toEqual([]);
 });
 

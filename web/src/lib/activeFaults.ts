@@ -18,8 +18,8 @@ export interface ActiveFault {
 
 export function activeFaultsOf(text: string): ActiveFault[] {
   try {
-    const told: unknown = JSON.parse(text);
-    return Array.isArray(told) ? (told as ActiveFault[]) : [];
+    const faults: unknown = JSON.parse(text);
+    return Array.isArray(faults) ? (faults as ActiveFault[]) : [];
   } catch {
     return [];
   }

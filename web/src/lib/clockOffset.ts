@@ -7,16 +7,16 @@ export interface Exchange {
 
 /**
  * By how much the page's clock is ahead of the server's, as NTP estimates it: of the last
- * exchanges the quickest, whose ways there and back cannot have differed by much (RFC 5905).
+ * exchanges the quickest, whose delays there and back cannot have differed by much (RFC 5905).
  */
 export class ClockOffset {
   private readonly exchanges: Exchange[] = [];
 
-  constructor(private readonly most = 8) {}
+  constructor(private readonly maxExchanges = 8) {}
 
   add(exchange: Exchange): void {
     this.exchanges.push(exchange);
-    if (this.exchanges.length > this.most) this.exchanges.shift();
+    if (this.exchanges.length > this.maxExchanges) this.exchanges.shift();
   }
 
   /** ms; NaN before there was an exchange. */

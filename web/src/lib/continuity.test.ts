@@ -16,7 +16,7 @@ test("a reset, another scenario and a log are something else", () => {
   expect(continues(flight, log)).toBe(false);
 });
 
-test("a log whose position is moved begins anew", () => {
+test("a log whose position is moved begins again", () => {
   expect(continues(log, { ...log, timeS: 12 })).toBe(true);
   expect(continues(log, { ...log, timeS: 60 })).toBe(false);
   expect(continues(log, { ...log, timeS: 9 })).toBe(false);

@@ -1,6 +1,6 @@
-// Numbers of things in words.
+// Counts in words.
 
 /** `1 message`, `1600 messages`. */
-export function counted(number: number, thing: string): string {
-  return `${number} ${thing}${number === 1 ? "" : "s"}`;
+export function counted(number: number, noun: string): string {
+  return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }

@@ -51,7 +51,7 @@ function interrupt({ x, y }: Points): void {
 
 export type Range = [number, number];
 
-/** Least and greatest value of many lists, NaN left out; null: there is none. */
+/** Minimum and maximum of many lists, NaN left out; null: there is none. */
 export function extentOf(lists: readonly (readonly number[])[]): Range | null {
   let [min, max] = [Infinity, -Infinity];
   for (const list of lists)

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import { ENDINGS, kindOf, UPLOAD_HINT } from "./fileKinds.ts";
 
-it("files are told apart by their endings, tables by their first line", () => {
+it("kinds of files are recognized by their endings, tables by their first line", () => {
   expect(kindOf("town.GeoJSON", "")).toBe("city");
   expect(kindOf("hall.v2.glb", "")).toBe("mesh");
   expect(kindOf("maze.map", "type octile")).toBe("grid_map");

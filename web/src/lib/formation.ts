@@ -1,13 +1,16 @@
-interface Place {
+interface Position {
   x: number;
   y: number;
 }
 
-/** Where each of a group goes so that its middle is at `goal` and all keep their places in it. */
-export function shifted(group: ReadonlyMap<string, Place>, goal: Place): Map<string, Place> {
-  const places = [...group.values()];
+/** Where each of a group goes so that its middle is at `goal` and all keep their positions in it. */
+export function shifted(
+  group: ReadonlyMap<string, Position>,
+  goal: Position,
+): Map<string, Position> {
+  const positions = [...group.values()];
   const middle = (axis: "x" | "y") =>
-    places.reduce((sum, place) => sum + place[axis], 0) / places.length;
+    positions.reduce((sum, position) => sum + position[axis], 0) / positions.length;
   const [dx, dy] = [goal.x - middle("x"), goal.y - middle("y")];
   return new Map([...group].map(([name, { x, y }]) => [name, { x: x + dx, y: y + dy }]));
 }

@@ -20,7 +20,7 @@ test("a box without points measures nothing", () => {
   expect(frame).toEqual({ middle: [1, 2, 3], radius: 4 });
 });
 
-test("a sphere fits the narrower side of the picture", () => {
+test("a sphere fits the narrower side of the view", () => {
   const wide = fittingDistance(5, 55, 1.6);
   const tall = fittingDistance(5, 55, 0.45);
   expect(5 / wide).toBeLessThan(Math.sin((27.5 * Math.PI) / 180));

@@ -33,7 +33,7 @@ export class FrameBox {
   }
 }
 
-/** Distance, m, from which a sphere fits a picture; `fov`: vertical, degrees. */
+/** Distance, m, from which a sphere fits the view; `fov`: vertical, degrees. */
 export function fittingDistance(radius: number, fov: number, aspect: number): number {
   const vertical = (fov * Math.PI) / 360;
   const horizontal = Math.atan(Math.tan(vertical) * aspect);

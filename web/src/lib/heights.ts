@@ -16,11 +16,11 @@ export interface Heights {
 export type Triangles = Float32Array;
 
 /** The highest surface in each cell; null where there are no triangles. */
-export function heightsOf(triangles: Triangles, mostCells: number): Heights | null {
+export function heightsOf(triangles: Triangles, maxCells: number): Heights | null {
   const box = boxOf(triangles);
   if (box === null) return null;
   const [width, depth] = [box.right - box.left, box.top - box.bottom];
-  const cell = Math.max(width, depth, 1e-3) / mostCells;
+  const cell = Math.max(width, depth, 1e-3) / maxCells;
   const columns = Math.max(1, Math.ceil(width / cell - 1e-9));
   const rows = Math.max(1, Math.ceil(depth / cell - 1e-9));
   const z = new Float32Array(columns * rows).fill(NaN);
@@ -64,7 +64,7 @@ export function meetGround(
   return null;
 }
 
-/** The ray is above the ground some way before `t` and below at `t`. */
+/** The ray is above the ground some distance before `t` and below at `t`. */
 function crossing(above: (t: number) => number, t: number): number {
   let [low, high] = [Math.max(0, t - Math.max(1, t * 0.5)), t];
   if (above(low) <= 0) low = 0;
@@ -93,10 +93,10 @@ function lay({ x, y, cell, columns, rows, z }: Heights, t: Triangles, at: number
   const [ax, ay, az, bx, by, bz, cx, cy, cz] = t.subarray(at, at + 9) as unknown as number[];
   const area = (bx! - ax!) * (cy! - ay!) - (cx! - ax!) * (by! - ay!);
   if (Math.abs(area) < 1e-12) return;
-  const first = (v: number, from: number, most: number) =>
-    Math.max(0, Math.min(most, Math.ceil((v - from) / cell - 0.5 - 1e-6)));
-  const last = (v: number, from: number, most: number) =>
-    Math.max(-1, Math.min(most - 1, Math.floor((v - from) / cell - 0.5 + 1e-6)));
+  const first = (v: number, from: number, count: number) =>
+    Math.max(0, Math.min(count, Math.ceil((v - from) / cell - 0.5 - 1e-6)));
+  const last = (v: number, from: number, count: number) =>
+    Math.max(-1, Math.min(count - 1, Math.floor((v - from) / cell - 0.5 + 1e-6)));
   const [low, high] = [
     first(Math.min(ay!, by!, cy!), y, rows),
     last(Math.max(ay!, by!, cy!), y, rows),

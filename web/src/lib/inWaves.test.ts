@@ -4,17 +4,17 @@ import { failureText, inWaves } from "./inWaves.ts";
 it("asks all, so many at a time, and keeps the reasons of those that fail", async () => {
   const names = Array.from({ length: 10 }, (_, i) => `uav${i + 1}`);
   let open = 0;
-  let most = 0;
+  let maxOpen = 0;
   const asked: string[] = [];
   const failed = await inWaves(names, 3, async (name) => {
     asked.push(name);
-    most = Math.max(most, ++open);
+    maxOpen = Math.max(maxOpen, ++open);
     await Promise.resolve();
     open--;
     if (name === "uav4") throw new Error("it has crashed");
   });
   expect(asked).toEqual(names);
-  expect(most).toBe(3);
+  expect(maxOpen).toBe(3);
   expect([...failed]).toEqual([["uav4", "it has crashed"]]);
 });
 

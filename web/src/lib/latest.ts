@@ -22,7 +22,7 @@ export class Latest<T> {
       const { value } = this.next;
       this.next = null;
       const pause = new Promise((resolve) => setTimeout(resolve, this.everyMs));
-      await this.send(value).catch(() => undefined); // told by who sends
+      await this.send(value).catch(() => undefined); // reported by `send` itself
       await pause;
     }
     this.running = false;

@@ -5,7 +5,7 @@ import {
   fitted,
   panned,
   pixelOf,
-  placeOf,
+  positionOf,
   zoomed,
   type Point,
 } from "./mapProjection.ts";
@@ -21,21 +21,21 @@ describe("the map's projection", () => {
 
   it("goes there and back", () => {
     const [px, py] = pixelOf(VIEW, SIZE, 3.5, 7.25);
-    expect(placeOf(VIEW, SIZE, px, py)).toEqual([3.5, 7.25]);
+    expect(positionOf(VIEW, SIZE, px, py)).toEqual([3.5, 7.25]);
   });
 
   it("keeps what is under the pointer while it zooms", () => {
-    const before = placeOf(VIEW, SIZE, 37, 251);
+    const before = positionOf(VIEW, SIZE, 37, 251);
     const near = zoomed(VIEW, SIZE, 1.7, 37, 251);
-    const after = placeOf(near, SIZE, 37, 251);
+    const after = positionOf(near, SIZE, 37, 251);
     expect(near.scale).toBeCloseTo(13.6);
     expect(after[0]).toBeCloseTo(before[0]);
     expect(after[1]).toBeCloseTo(before[1]);
   });
 
   it("follows the pointer while it is dragged", () => {
-    const before = placeOf(VIEW, SIZE, 100, 100);
-    const after = placeOf(panned(VIEW, 20, -30), SIZE, 120, 70);
+    const before = positionOf(VIEW, SIZE, 100, 100);
+    const after = positionOf(panned(VIEW, 20, -30), SIZE, 120, 70);
     expect(after[0]).toBeCloseTo(before[0]);
     expect(after[1]).toBeCloseTo(before[1]);
   });
@@ -56,7 +56,7 @@ describe("the map's projection", () => {
     }
   });
 
-  it("fits anew when what is to be seen changes, and holds still between", () => {
+  it("fits again when what is to be seen changes, and holds still between", () => {
     const auto = new AutoFit();
     const empty = auto.of([null, 0], () => [], SIZE);
     const world: Point[] = [

@@ -14,7 +14,7 @@ test("noise is not blown up to the whole plot", () => {
   expect(widened(2.999, 3.001, 0.5)).toEqual([2.75, 3.25]);
 });
 
-test("what is larger than the least span keeps its range", () => {
+test("what is larger than the minimum span keeps its range", () => {
   expect(widened(0, 12, 0.5)).toEqual([0, 12]);
 });
 

@@ -1,4 +1,4 @@
-/** The least span of an axis by what is plotted, so that noise does not look like motion. */
+/** The minimum span of an axis by what is plotted, so that noise does not look like motion. */
 const SPANS: readonly (readonly [RegExp, number])[] = [
   [/latitude|longitude/, 2e-5], // degrees: about 2 m
   [/covariance/, 1e-6],
@@ -16,7 +16,7 @@ const SPANS: readonly (readonly [RegExp, number])[] = [
 /** Of the largest value, for quantities that are not known. */
 const MIN_FRACTION = 0.01;
 
-/** Least span of a line by the path of its field: the innermost name that is known; NaN: none is. */
+/** Minimum span of a line by the path of its field: the innermost name that is known; NaN: none is. */
 export function minSpanOf(path: string): number {
   for (const part of path.toLowerCase().split(".").reverse()) {
     const known = SPANS.find(([pattern]) => pattern.test(part));
@@ -28,7 +28,7 @@ export function minSpanOf(path: string): number {
 /** The range of an axis for values between `min` and `max`: around them, and `minSpan` at least. */
 export function widened(min: number, max: number, minSpan: number): [number, number] {
   const magnitude = Math.max(Math.abs(min), Math.abs(max));
-  const least = Number.isNaN(minSpan) ? MIN_FRACTION * magnitude : minSpan;
-  const missing = Math.max(0, least - (max - min));
+  const span = Number.isNaN(minSpan) ? MIN_FRACTION * magnitude : minSpan;
+  const missing = Math.max(0, span - (max - min));
   return [min - missing / 2, max + missing / 2];
 }

@@ -22,7 +22,7 @@ describe("turbo", () => {
   });
 });
 
-describe("pictures", () => {
+describe("images", () => {
   it("have their channels in order, and rows of any length", () => {
     const padded = { ...image("bgr8", Uint8Array.of(1, 2, 3, 0, 4, 5, 6, 0), 1, 3, 2), step: 4 };
     expect(Array.from(pixelsOf(padded).rgba)).toEqual([3, 2, 1, 255, 6, 5, 4, 255]);
@@ -32,7 +32,7 @@ describe("pictures", () => {
     expect(Array.from(pixelsOf(image("mono8", Uint8Array.of(9), 1)).rgba)).toEqual([9, 9, 9, 255]);
   });
 
-  it("of depth tell their range, near is red, and what is unknown is grey", () => {
+  it("of depth report their range, near is red, and what is unknown is grey", () => {
     const depths = new Uint8Array(new Float32Array([2, NaN, 10, Infinity]).buffer);
     const { rgba, range } = pixelsOf(image("32FC1", depths, 4, 4));
     expect(range).toEqual([2, 10]);

@@ -1,4 +1,4 @@
-// Raw pictures (sensor_msgs/Image) as pixels of a canvas.
+// Raw images (sensor_msgs/Image) as pixels of a canvas.
 
 import { labelColour, TURBO_TABLE } from "./colourMaps.ts";
 import { ownEntry } from "./ownEntry.ts";
@@ -17,7 +17,7 @@ export interface Pixels {
   width: number;
   height: number;
   rgba: Uint8ClampedArray<ArrayBuffer>;
-  /** Nearest and farthest that the colours tell, m; null: it shows no distances. */
+  /** Nearest and farthest that the colours show, m; null: it shows no distances. */
   range: [number, number] | null;
 }
 
@@ -74,7 +74,7 @@ function ofDepth(image: RawImage): Pixels {
   const scale = 255 / Math.max(1e-6, range[1] - range[0]);
   const rgba = painted(image, (i, to, into) => {
     const depth = depths[i]!;
-    // Near is red, which is what matters to who flies there.
+    // Near is red, which matters most in flight.
     const row = Math.round(255 - (depth - range[0]) * scale);
     if (Number.isFinite(depth)) {
       const from = Math.max(0, Math.min(255, row)) * 4;
@@ -139,13 +139,13 @@ function numbersOf(image: RawImage): Float32Array {
   return numbers;
 }
 
-/** Least and greatest of the finite numbers. */
+/** Minimum and maximum of the finite numbers. */
 function rangeOf(numbers: Float32Array): [number, number] {
-  let [least, most] = [Infinity, -Infinity];
+  let [min, max] = [Infinity, -Infinity];
   for (const number of numbers) {
     if (!Number.isFinite(number)) continue;
-    if (number < least) least = number;
-    if (number > most) most = number;
+    if (number < min) min = number;
+    if (number > max) max = number;
   }
-  return least <= most ? [least, most] : [0, 0];
+  return min <= max ? [min, max] : [0, 0];
 }

@@ -10,7 +10,7 @@ describe("a rate", () => {
     expect(meter.hz).toBeCloseTo(40);
   });
 
-  it("begins anew after a reset", () => {
+  it("begins again after a reset", () => {
     const meter = new RateMeter();
     for (const stamp of [100, 101, 0, 0.5, 1]) meter.add(stamp);
     expect(meter.hz).toBeCloseTo(2);
@@ -25,13 +25,13 @@ describe("a rate", () => {
     expect(meter.hzAt(20)).toBeCloseTo(0.4);
   });
 
-  it("is told for both clocks where they differ", () => {
+  it("is shown for both clocks where they differ", () => {
     expect(ratesText(0.7, 10)).toBe("10 Hz simulated, 0.7 Hz real");
     expect(ratesText(9.7, 10)).toBe("10 Hz");
     expect(ratesText(NaN, NaN)).toBe("–");
   });
 
-  it("is told shortly", () => {
+  it("is shown in short form", () => {
     expect(rateText(NaN)).toBe("–");
     expect(rateText(39.98)).toBe("40 Hz");
     expect(rateText(0.5)).toBe("0.5 Hz");

@@ -1,8 +1,8 @@
-/** How often something comes, told by its own stamps, so that speed and throttling do not count. */
+/** How often something comes, by its own stamps, so that speed and throttling do not count. */
 export class RateMeter {
   private stamps: number[] = [];
 
-  constructor(private readonly most = 20) {}
+  constructor(private readonly maxSamples = 20) {}
 
   /** A message with this stamp, s, has come. */
   add(stampS: number): void {
@@ -10,7 +10,7 @@ export class RateMeter {
     if (last !== undefined && stampS < last) this.stamps = []; // a reset
     if (stampS === last) return;
     this.stamps.push(stampS);
-    if (this.stamps.length > this.most) this.stamps.shift();
+    if (this.stamps.length > this.maxSamples) this.stamps.shift();
   }
 
   /** Hz of the stamps' time; NaN before there are two. */
@@ -25,12 +25,12 @@ export class RateMeter {
 export class ArrivalMeter {
   private arrivals: number[] = [];
 
-  constructor(private readonly most = 20) {}
+  constructor(private readonly maxSamples = 20) {}
 
   /** Something has come at this wall time, s. */
   add(wallS: number): void {
     this.arrivals.push(wallS);
-    if (this.arrivals.length > this.most) this.arrivals.shift();
+    if (this.arrivals.length > this.maxSamples) this.arrivals.shift();
   }
 
   /** Hz at this wall time, s; NaN before there are two. */
@@ -44,7 +44,7 @@ export class ArrivalMeter {
   }
 }
 
-/** Rates that differ by less are told as one. */
+/** Rates that differ by less are shown as one. */
 const SAME = 0.2;
 
 /** The rate in simulated time, and the one in wall time where it differs. */

@@ -7,7 +7,7 @@ it("a UAV is on the way to its start until its poses are those of the new start"
   expect(restarts.includes("uav2", 9, 0)).toBe(false);
   expect(restarts.includes("uav1", 9.9, 0)).toBe(true); // poses from before the command
   expect(restarts.includes("uav1", 10, 5000)).toBe(true); // paused: none has come since
-  expect(restarts.includes("uav1", 10.02, 5100)).toBe(true); // on its way in the picture
+  expect(restarts.includes("uav1", 10.02, 5100)).toBe(true); // on its way in the scene
   expect(restarts.includes("uav1", 10.9, 5700)).toBe(false);
   expect(restarts.includes("uav1", 10.9, 5701)).toBe(false);
 });

@@ -10,7 +10,7 @@ interface Restart {
 
 /**
  * UAVs that are put back to their start while the others fly on. The command is known before the
- * pose follows it, and the picture moves on from the pose before: until then there is no trail.
+ * pose follows it, and the scene moves on from the pose before: until then there is no trail.
  */
 export class Restarts {
   private readonly open = new Map<string, Restart>();

@@ -8,8 +8,8 @@ test("sections stand as the server orders them, after the visitor's own", () => 
     { name: "swarm_100", section: "Start here" },
     { name: "mine", section: "Yours" },
   ];
-  const told = sectionsOf(cards).map(([section, inside]) => [section, inside.map((c) => c.name)]);
-  expect(told).toEqual([
+  const named = sectionsOf(cards).map(([section, inside]) => [section, inside.map((c) => c.name)]);
+  expect(named).toEqual([
     ["Yours", ["mine"]],
     ["Start here", ["hover", "swarm_100"]],
     ["Teams", ["coverage"]],

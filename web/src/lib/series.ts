@@ -55,7 +55,7 @@ export class Series {
 export type Columns = [Float64Array, ...(number | null)[][]];
 
 /**
- * What of `lines` is seen between two times on `pixels` columns: least and greatest value of each
+ * What of `lines` is seen between two times on `pixels` columns: minimum and maximum of each
  * column, so that no peak is lost however many points there are.
  */
 export function columnsOf(

@@ -26,7 +26,7 @@ it("times of both generations are read", () => {
   expect(secondsOf({ secs: 3, nsecs: 250_000_000 })).toBe(3.25);
 });
 
-it("wall time is told on a clock of 24 hours", () => {
+it("wall time is shown on a clock of 24 hours", () => {
   expect(timeOfDay(new Date(2024, 4, 1, 16, 5, 9).getTime())).toBe("16:05:09");
   expect(timeOfDay(new Date(2024, 4, 1, 0, 30, 0).getTime())).toBe("00:30:00");
 });

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { bytesText, TrafficMeter } from "./traffic.ts";
 
 describe("a meter of traffic", () => {
-  it("tells the rate of the last seconds", () => {
+  it("returns the rate of the last seconds", () => {
     const meter = new TrafficMeter(3000);
     for (let ms = 0; ms <= 10_000; ms += 25) meter.add(ms, 100);
     const { hz, bytesPerS, bytes } = meter.read(10_000);

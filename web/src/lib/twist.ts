@@ -1,4 +1,4 @@
-// Flight by hand: what keys, sticks and a gamepad ask for, as a velocity in the level heading frame.
+// Manual control: what keys, sticks and a gamepad ask for, as a velocity in the level heading frame.
 
 /** Shares of the full speed, each -1..1: ahead, left, up, and turning left. */
 export interface Wish {

@@ -55,12 +55,12 @@ export function typesOf(uavs: readonly Coloured[]): string[] {
   return [...new Set(uavs.map(typeOf))];
 }
 
-/** The end of a scale that all values fit in: a round number, and no less than `least`. */
-export function topOf(uavs: readonly Coloured[], by: Colouring, least: number): number {
-  let most = least;
+/** The end of a scale that all values fit in: a round number, and no less than `minTop`. */
+export function topOf(uavs: readonly Coloured[], by: Colouring, minTop: number): number {
+  let top = minTop;
   for (const uav of uavs) {
     const value = valueOf(uav, by);
-    if (value > most) most = value;
+    if (value > top) top = value;
   }
-  return roundAbove(most);
+  return roundAbove(top);
 }

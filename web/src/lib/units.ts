@@ -23,8 +23,8 @@ const UNITS: readonly (readonly [RegExp, string])[] = [
   [/_s$/, "s"],
 ];
 
-/** Of an axis. */
-const MOST_NAMES = 3;
+/** Names on an axis, at most. */
+const MAX_NAMES = 3;
 
 /** Unit of a field; empty: not known. */
 export function unitOf(path: string, type = ""): string {
@@ -43,7 +43,7 @@ export function axisText(lines: readonly { path: string; type: string }[]): stri
   const paths = [...new Set(lines.map(({ path }) => shortOf(path)))];
   const names = paths.length > 1 ? paths.map((path) => path.split(".").at(-1)!) : paths;
   const [unit = ""] = units;
-  const text = [...new Set(names)].slice(0, MOST_NAMES).join("; ");
+  const text = [...new Set(names)].slice(0, MAX_NAMES).join("; ");
   return units.size === 1 && unit !== "" ? `${text}, ${unit}` : text;
 }
 

@@ -21,7 +21,7 @@ export interface Curve {
 
 const ODOMETRY = /^nav_msgs\/(msg\/)?Odometry$/;
 
-/** Where a UAV is, seen from above: by `/NAME/odom`, or what else tells its odometry; else none. */
+/** Where a UAV is, seen from above: by `/NAME/odom`, or another topic with its odometry; else none. */
 export function positionCurve(topics: readonly Named[], uav: string): Curve[] {
   const own = topics.filter(
     ({ name, type }) => ODOMETRY.test(type) && (uav === "" || name.startsWith(`/${uav}/`)),

@@ -3,9 +3,9 @@ import type { Transforms } from "../lib/cdrTransforms.ts";
 import { FrameTree, transformsOf } from "./frameTree.ts";
 
 /** Transforms `parent > child` without rotation, by x. */
-function along(places: Record<string, number>): Transforms {
-  const names = Object.keys(places).map((name) => name.split(" > ") as [string, string]);
-  const poses = Object.values(places).flatMap((x) => [x, 0, 0, 0, 0, 0, 1]);
+function along(positions: Record<string, number>): Transforms {
+  const names = Object.keys(positions).map((name) => name.split(" > ") as [string, string]);
+  const poses = Object.values(positions).flatMap((x) => [x, 0, 0, 0, 0, 0, 1]);
   return {
     stampS: 1,
     parents: names.map(([parent]) => parent),
@@ -17,19 +17,19 @@ function along(places: Record<string, number>): Transforms {
 let tree: FrameTree;
 beforeEach(() => (tree = new FrameTree()));
 
-function places(): Record<string, number> {
+function positions(): Record<string, number> {
   const { names } = tree.names();
   const rows = tree.rows(names);
   return Object.fromEntries(names.map((name, i) => [name, rows[7 * i]!]));
 }
 
-it("frames are where their parents lead, whichever way they came", () => {
+it("frames are where their parents lead, in whichever order they came", () => {
   tree.fix(along({ "map > uav1/odom": 10 }));
   tree.move(along({ "/uav1/odom > uav1/base_link": 3, "uav1/base_link > uav1/laser": 0.5 }));
-  expect(places()).toEqual({ "uav1/base_link": 13, "uav1/laser": 13.5 });
+  expect(positions()).toEqual({ "uav1/base_link": 13, "uav1/laser": 13.5 });
   const { version } = tree;
   tree.move(along({ "uav1/odom > uav1/base_link": 4 }));
-  expect(places()).toEqual({ "uav1/base_link": 14, "uav1/laser": 14.5 });
+  expect(positions()).toEqual({ "uav1/base_link": 14, "uav1/laser": 14.5 });
   expect(tree.version).toBe(version);
 });
 
@@ -37,15 +37,15 @@ it("the truth wins over estimates, and what it no longer names is gone", () => {
   tree.fix(along({ "map > uav1/odom": 10 }));
   tree.move(along({ "uav1/odom > uav1/base_link": 3, "uav1/base_link > uav1/laser": 0.5 }));
   tree.moveTruly(along({ "map > uav1/base_link": 1, "map > uav2/base_link": 2 }));
-  expect(places()).toEqual({ "uav1/base_link": 1, "uav2/base_link": 2, "uav1/laser": 1.5 });
+  expect(positions()).toEqual({ "uav1/base_link": 1, "uav2/base_link": 2, "uav1/laser": 1.5 });
   const { version } = tree;
   tree.moveTruly(along({ "map > uav1/base_link": 5, "map > uav2/base_link": 6 }));
-  expect(places()).toEqual({ "uav1/base_link": 5, "uav2/base_link": 6, "uav1/laser": 5.5 });
+  expect(positions()).toEqual({ "uav1/base_link": 5, "uav2/base_link": 6, "uav1/laser": 5.5 });
   expect(tree.version).toBe(version);
   tree.moveTruly(along({ "map > uav2/base_link": 7 }));
   expect(tree.version).toBeGreaterThan(version);
-  expect(places()).toMatchObject({ "uav2/base_link": 7 });
-  expect(places()).not.toHaveProperty("uav1/base_link");
+  expect(positions()).toMatchObject({ "uav2/base_link": 7 });
+  expect(positions()).not.toHaveProperty("uav1/base_link");
 });
 
 it("the same number of other frames are other frames", () => {
@@ -53,7 +53,7 @@ it("the same number of other frames are other frames", () => {
   const { version } = tree;
   tree.moveTruly(along({ "map > b": 3, "map > c": 4 }));
   expect(tree.version).toBeGreaterThan(version);
-  expect(places()).toEqual({ b: 3, c: 4 });
+  expect(positions()).toEqual({ b: 3, c: 4 });
 });
 
 it("transforms that come as objects are read alike", () => {

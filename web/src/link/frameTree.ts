@@ -17,7 +17,7 @@ export class FrameTree {
   version = 0;
   private readonly moving = new Map<string, Edge>();
   private readonly fixed = new Map<string, Edge>();
-  /** Rows in `truePoses` of places told straight in the map by the simulation; they win over estimates. */
+  /** Rows in `truePoses` of ground truth poses in the map; they win over estimates. */
   private trueRows = new Map<string, number>();
   private truePoses: Float64Array = new Float64Array(0);
 
@@ -36,7 +36,7 @@ export class FrameTree {
     this.version++;
   }
 
-  /** Take one message with the true places of everything; what it lacks is gone. */
+  /** Take one message with the true poses of everything; what it lacks is gone. */
   moveTruly({ children, poses }: Transforms): void {
     this.truePoses = poses;
     const before = this.trueRows;

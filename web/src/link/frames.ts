@@ -59,7 +59,7 @@ export class Frames {
     return this.climb(name, 0);
   }
 
-  /** The moving frame that `name` hangs on, and its place there: for what moves along. */
+  /** The moving frame that `name` hangs on, and its pose there: for what moves along. */
   mount(name: string): { base: string; pose: Pose } | null {
     let pose: Pose = [0, 0, 0, 0, 0, 0, 1];
     let frame = name;

@@ -16,12 +16,12 @@ interface Subscription {
   key: string;
   listeners: Set<Listener>;
   last: Received<never> | null;
-  /** Whether a listener could not read a message; told once. */
+  /** Whether a listener could not read a message; reported once. */
   unreadable: boolean;
 }
 
 export interface SubscribeOptions {
-  /** Least time between two messages, ms. */
+  /** Minimum time between two messages, ms. */
   throttleMs?: number;
   /** How many wait at the server for a slow page. */
   depth?: number;
@@ -34,7 +34,7 @@ export class Link {
   reason = "";
   url = "";
   /** When anything last arrived, as `nowMs()`. */
-  heardMs = 0;
+  receivedMs = 0;
   bytesPerS = 0;
   messagesPerS = 0;
 
@@ -46,7 +46,7 @@ export class Link {
   private readonly byKey = new Map<string, Subscription>();
   private readonly byId = new Map<number, Subscription>();
   private readonly answers = new Map<number, (answer: FromWorker & { kind: "answer" }) => void>();
-  private readonly watchers = new Set<() => void>();
+  private readonly stateListeners = new Set<() => void>();
   private trafficMs = 0;
 
   constructor(worker?: Worker) {
@@ -55,18 +55,18 @@ export class Link {
   }
 
   connect(url: string): void {
-    this.tell({ kind: "connect", url });
+    this.post({ kind: "connect", url });
   }
 
   /** Follow the transforms of the graph; with `truth` those of the simulation itself. */
   followFrames(throttleMs: number, truth: boolean): void {
-    this.tell({ kind: "followFrames", throttleMs, truth });
+    this.post({ kind: "followFrames", throttleMs, truth });
   }
 
-  /** Be told when `state` changes; returns how to end that. */
-  watch(watcher: () => void): () => void {
-    this.watchers.add(watcher);
-    return () => this.watchers.delete(watcher);
+  /** Call `listener` when `state` changes; returns how to end that. */
+  watch(listener: () => void): () => void {
+    this.stateListeners.add(listener);
+    return () => this.stateListeners.delete(listener);
   }
 
   /** Receive a topic; equal wishes share one subscription. Returns how to end it. */
@@ -100,7 +100,7 @@ export class Link {
       };
       this.byKey.set(key, subscription);
       this.byId.set(subscription.id, subscription);
-      this.tell({ kind: "subscribe", id: subscription.id, topic, type, throttleMs, depth });
+      this.post({ kind: "subscribe", id: subscription.id, topic, type, throttleMs, depth });
     } else if (subscription.last !== null) {
       listener(subscription.last); // what is latched was sent to the first listener only
     }
@@ -111,7 +111,7 @@ export class Link {
       if (mine.listeners.size > 0 || this.byKey.get(key) !== mine) return;
       this.byKey.delete(key);
       this.byId.delete(mine.id);
-      this.tell({ kind: "unsubscribe", id: mine.id });
+      this.post({ kind: "unsubscribe", id: mine.id });
     };
   }
 
@@ -130,7 +130,7 @@ export class Link {
         if (answer.ok) resolve(answer.value);
         else reject(new Error(answer.reason));
       });
-      this.tell({ kind: "call", id, service, type, request, timeoutS });
+      this.post({ kind: "call", id, service, type, request, timeoutS });
     });
   }
 
@@ -141,7 +141,7 @@ export class Link {
   ): void;
   publish(topic: string, type: string, message: unknown): void;
   publish(topic: string, type: string, message: unknown): void {
-    this.tell({ kind: "publish", topic, type, message });
+    this.post({ kind: "publish", topic, type, message });
   }
 
   /** Publish now, and again until it is renewed, ended, or too old (`streams.ts`): then `rest`. */
@@ -151,57 +151,57 @@ export class Link {
     message: DeepPartial<Messages[N]>,
     rest: DeepPartial<Messages[N]>,
   ): void {
-    this.tell({ kind: "stream", topic, type, message, rest });
+    this.post({ kind: "stream", topic, type, message, rest });
   }
 
   endStream(topic: string): void {
-    this.tell({ kind: "endStream", topic });
+    this.post({ kind: "endStream", topic });
   }
 
   unadvertise(topic: string): void {
-    this.tell({ kind: "unadvertise", topic });
+    this.post({ kind: "unadvertise", topic });
   }
 
-  private tell(order: ToWorker): void {
+  private post(order: ToWorker): void {
     this.worker.postMessage(order);
   }
 
-  private take(told: FromWorker): void {
-    switch (told.kind) {
+  private take(message: FromWorker): void {
+    switch (message.kind) {
       case "message": {
-        this.heardMs = told.arrivedMs;
-        const subscription = this.byId.get(told.id);
+        this.receivedMs = message.arrivedMs;
+        const subscription = this.byId.get(message.id);
         if (subscription === undefined) return;
-        const received = told as unknown as Received<never>;
+        const received = message as unknown as Received<never>;
         subscription.last = received;
         for (const listener of subscription.listeners) hand(received, listener, subscription);
         break;
       }
       case "poses":
-        this.heardMs = told.arrivedMs;
-        this.frames.move(told);
+        this.receivedMs = message.arrivedMs;
+        this.frames.move(message);
         break;
       case "frames":
-        this.frames.rename(told);
+        this.frames.rename(message);
         break;
       case "answer": {
-        const done = this.answers.get(told.id);
-        this.answers.delete(told.id);
-        done?.(told);
+        const done = this.answers.get(message.id);
+        this.answers.delete(message.id);
+        done?.(message);
         break;
       }
       case "complaint":
-        this.onComplaint(told.text);
+        this.onComplaint(message.text);
         break;
       case "traffic":
-        this.measure(told.bytes, told.messages, told.arrivedMs);
+        this.measure(message.bytes, message.messages, message.arrivedMs);
         break;
       case "state":
-        this.state = told.state;
-        this.reason = told.reason;
-        this.url = told.url;
-        if (told.state !== "open") for (const s of this.byId.values()) s.last = null;
-        for (const watcher of this.watchers) watcher();
+        this.state = message.state;
+        this.reason = message.reason;
+        this.url = message.url;
+        if (message.state !== "open") for (const s of this.byId.values()) s.last = null;
+        for (const listener of this.stateListeners) listener();
         break;
     }
   }

@@ -1,4 +1,4 @@
-// What the page and its worker tell each other. The worker owns the connection.
+// Messages between the page and its worker. The worker owns the connection.
 
 import type { StreamOrder } from "./streams.ts";
 
@@ -9,7 +9,7 @@ export interface Wish {
   topic: string;
   /** Type as `sensor_msgs/msg/LaserScan`. */
   type: string;
-  /** Least time between two messages, ms; 0: every message. */
+  /** Minimum time between two messages, ms; 0: every message. */
   throttleMs: number;
   /** How many wait at the server for a slow page before the oldest is dropped. */
   depth: number;

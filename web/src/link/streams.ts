@@ -1,6 +1,6 @@
-// Commands that are told again and again. The page renews each many times a second; where its thread
+// Commands that are published repeatedly. The page renews each many times a second; where its thread
 // is held up, by a slow frame or a large message, they go on from here for as long as the lease
-// lasts. Then whoever is commanded is told to rest: nobody may be left flying by a page that hangs.
+// lasts. Then the UAV is commanded to rest: a page that hangs must not leave a UAV flying.
 
 export interface StreamOrder {
   topic: string;
@@ -47,7 +47,7 @@ export class Streams {
     this.publish(topic, stream.order.type, stream.order.rest);
   }
 
-  /** Without a word, as when the connection is lost: who is commanded rests by itself. */
+  /** Without a message, as when the connection is lost: the UAV comes to rest by itself. */
   drop(): void {
     for (const topic of [...this.streams.keys()]) this.forget(topic);
   }

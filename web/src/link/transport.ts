@@ -1,6 +1,6 @@
 import { AbstractTransport, type RosbridgeMessage } from "roslib";
 
-/** roslib's way to the server over the browser's WebSocket; knows how large the last frame was. */
+/** roslib's connection to the server over the browser's WebSocket; knows how large the last frame was. */
 export class MeteredTransport extends AbstractTransport {
   bytes = 0;
   messages = 0;

@@ -1,5 +1,5 @@
 // The connection to rosbridge. It lives in a worker, so that neither decoding nor a flood of
-// messages can hold up the picture. It reconnects by itself and subscribes anew.
+// messages can hold up the drawing. It reconnects by itself and subscribes again.
 
 import { Ros, Service, Topic } from "roslib";
 import type { geometry_msgs_TransformStamped } from "../messages/generated.ts";
@@ -78,12 +78,12 @@ setInterval(() => {
   if (transport === null) return;
   const { bytes, messages } = transport;
   transport.bytes = transport.messages = 0;
-  tell({ kind: "traffic", bytes, messages, arrivedMs: nowMs() });
+  post({ kind: "traffic", bytes, messages, arrivedMs: nowMs() });
 }, TRAFFIC_MS);
 
 async function connect(): Promise<void> {
   ros?.close();
-  tell({ kind: "state", state: "connecting", reason: "", url });
+  post({ kind: "state", state: "connecting", reason: "", url });
   const mine = new Ros({
     transportFactory: (address) => {
       transport = new MeteredTransport(new WebSocket(address));
@@ -95,11 +95,11 @@ async function connect(): Promise<void> {
   mine.on("connection", () => {
     retryMs = FIRST_RETRY_MS;
     tree.forget();
-    tell({ kind: "state", state: "open", reason: "", url });
+    post({ kind: "state", state: "open", reason: "", url });
     for (const [id, wish] of wishes) subscribe(id, wish);
     followFrames();
   });
-  mine.on("error", () => undefined); // a close follows, and tells more
+  mine.on("error", () => undefined); // a close follows, and says more
   mine.on("close", (event) => {
     if (mine !== ros) return;
     lose(event as CloseEvent);
@@ -110,7 +110,7 @@ async function connect(): Promise<void> {
 /** What is refused without an answer of its own, such as a message, comes as a status. */
 function heed(message: object): void {
   const { op, level, msg } = message as { op?: string; level?: string; msg?: string };
-  if (op === "status" && level === "error") tell({ kind: "complaint", text: msg ?? "" });
+  if (op === "status" && level === "error") post({ kind: "complaint", text: msg ?? "" });
 }
 
 function lose(event: CloseEvent): void {
@@ -123,7 +123,7 @@ function lose(event: CloseEvent): void {
   waiting.clear();
   const refused = event.code === POLICY_VIOLATION;
   const reason = event.reason || (refused ? "the server refused the connection" : "");
-  tell({ kind: "state", state: refused ? "refused" : "lost", reason, url });
+  post({ kind: "state", state: refused ? "refused" : "lost", reason, url });
   setTimeout(() => void connect(), retryMs);
   retryMs = Math.min(LONGEST_RETRY_MS, retryMs * 2);
 }
@@ -132,7 +132,7 @@ function subscribe(id: number, wish: Wish): void {
   const topic = make(wish);
   topics.set(id, topic);
   topic.subscribe((message) =>
-    tell({ kind: "message", id, message, bytes: frameBytes(), arrivedMs: nowMs() }),
+    post({ kind: "message", id, message, bytes: frameBytes(), arrivedMs: nowMs() }),
   );
 }
 
@@ -144,7 +144,7 @@ function make(wish: Wish, compression = "cbor"): Topic {
     compression,
     throttle_rate: wish.throttleMs,
     queue_length: wish.depth,
-    reconnect_on_close: false, // subscribed anew with the next connection, see `connect`
+    reconnect_on_close: false, // subscribed again with the next connection, see `connect`
   });
 }
 
@@ -153,7 +153,7 @@ function call(order: Extract<ToWorker, { kind: "call" }>): void {
   const done = (answer: FromWorker) => {
     if (!waiting.delete(id)) return;
     clearTimeout(timer);
-    tell(answer);
+    post(answer);
   };
   const fail = (reason: string) => done({ kind: "answer", id, ok: false, reason });
   const timer = setTimeout(() => fail(`${service} timed out`), timeoutS * 1000);
@@ -182,9 +182,9 @@ function publish(name: string, type: string, message: unknown): void {
 // --------------------------------------------------------------------------------- transforms
 
 const frameTopics: Topic[] = [];
-let toldVersion = -1;
-/** Whether the simulation itself tells true poses, which win over estimates. */
-let truthHeard = false;
+let sentVersion = -1;
+/** Whether the simulation publishes ground truth, which wins over estimates. */
+let truthReceived = false;
 let names: string[] = [];
 
 function followFrames(): void {
@@ -208,27 +208,27 @@ function followFrames(): void {
   };
   listen("/tf_static", 0, (transforms) => {
     tree.fix(transforms);
-    tellPoses(transforms);
+    postPoses(transforms);
   });
   listen("/tf", 0, (transforms) => {
     tree.move(transforms);
-    if (!truthHeard) tellPoses(transforms);
+    if (!truthReceived) postPoses(transforms);
   });
-  truthHeard = false; // a recording may lack it
+  truthReceived = false; // a recording may lack it
   if (!truth) return;
   listen("/ground_truth/tf", throttleMs, (transforms) => {
-    truthHeard = true;
+    truthReceived = true;
     tree.moveTruly(transforms);
-    tellPoses(transforms);
+    postPoses(transforms);
   });
 }
 
-function tellPoses({ stampS }: Transforms): void {
-  if (tree.version !== toldVersion) {
-    toldVersion = tree.version;
-    const told = tree.names();
-    names = told.names;
-    tell({ kind: "frames", ...told });
+function postPoses({ stampS }: Transforms): void {
+  if (tree.version !== sentVersion) {
+    sentVersion = tree.version;
+    const frames = tree.names();
+    names = frames.names;
+    post({ kind: "frames", ...frames });
   }
   if (Number.isNaN(stampS)) return;
   const poses = tree.rows(names);
@@ -239,7 +239,7 @@ function tellPoses({ stampS }: Transforms): void {
 
 // -------------------------------------------------------------------------------------- small
 
-function tell(message: FromWorker): void {
+function post(message: FromWorker): void {
   self.postMessage(message);
 }
 

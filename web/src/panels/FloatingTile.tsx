@@ -2,9 +2,9 @@ import { ActionIcon, Group, Paper, Text } from "@mantine/core";
 import { Minus, Plus, X } from "lucide-react";
 import { useRef, type KeyboardEvent, type PointerEvent, type ReactNode } from "react";
 import { create } from "zustand";
-import { placeTile, useLayout, type Tile } from "../state/layout.ts";
+import { moveTile, useLayout, type Tile } from "../state/layout.ts";
 
-const LEAST_PX = 140;
+const MIN_PX = 140;
 const STEP = 0.05;
 const STEP_PX = 40;
 
@@ -12,12 +12,12 @@ const STEP_PX = 40;
 const useFront = create(() => ({ name: "" }));
 
 interface FloatingTileProps {
-  /** Under which its place is kept. */
+  /** Under which its position is stored. */
   name: string;
   title: string;
   usual: Tile;
-  /** Of the scene's width, until somebody has placed the tile. */
-  mostShare?: number;
+  /** Fraction of the scene's width at most, until the user has moved the tile. */
+  maxFraction?: number;
   /** Width over height of what is in it. */
   aspect: number;
   actions?: ReactNode;
@@ -27,16 +27,16 @@ interface FloatingTileProps {
 
 /** A small window over the scene: drag its title, pull its corner, or use the keys on the title. */
 export function FloatingTile(props: FloatingTileProps) {
-  const { name, title, usual, mostShare = 1, aspect, actions, onClose, children } = props;
-  const placed = useLayout((layout) => layout.tiles[name]);
-  const tile = placed ?? usual;
+  const { name, title, usual, maxFraction = 1, aspect, actions, onClose, children } = props;
+  const stored = useLayout((layout) => layout.tiles[name]);
+  const tile = stored ?? usual;
   const box = useRef<HTMLDivElement>(null);
   const grip = useRef<{ x: number; y: number; tile: Tile } | null>(null);
   const inFront = useFront((front) => front.name === name);
-  /** As it is on the screen: narrow scenes make unplaced tiles smaller. */
+  /** As it is on the screen: narrow scenes make tiles that were not moved smaller. */
   const present = () => ({ ...tile, width: box.current?.offsetWidth ?? tile.width });
   const raise = () => useFront.setState({ name });
-  const place = (next: Tile) => placeTile(name, clamped(next));
+  const move = (next: Tile) => moveTile(name, clamped(next));
   const begin = (event: PointerEvent) => {
     if ((event.target as HTMLElement).closest("button") !== null) return;
     event.currentTarget.setPointerCapture(event.pointerId);
@@ -49,14 +49,14 @@ export function FloatingTile(props: FloatingTileProps) {
     const room = roomOf(box.current!);
     const x = from.tile.x + (event.clientX - from.x) / room.width;
     const y = from.tile.y + (event.clientY - from.y) / room.height;
-    place({ ...from.tile, x, y });
+    move({ ...from.tile, x, y });
   };
   const pull = (event: PointerEvent) => {
     const from = grip.current;
     if (from === null) return;
     // The corner away from the nearer edge of the scene is pulled.
     const towards = from.tile.x > 0.5 ? -1 : 1;
-    place({ ...from.tile, width: from.tile.width + towards * (event.clientX - from.x) });
+    move({ ...from.tile, width: from.tile.width + towards * (event.clientX - from.x) });
   };
   const key = (event: KeyboardEvent) => {
     const steps: Record<string, Partial<Tile>> = {
@@ -69,7 +69,7 @@ export function FloatingTile(props: FloatingTileProps) {
     if (step === undefined || event.target !== event.currentTarget) return;
     event.preventDefault();
     event.stopPropagation();
-    place({ ...present(), ...step });
+    move({ ...present(), ...step });
   };
   return (
     <Paper
@@ -79,7 +79,7 @@ export function FloatingTile(props: FloatingTileProps) {
       withBorder
       role="group"
       aria-label={title}
-      style={{ ...styleOf(tile), width: placed?.width ?? narrowed(usual.width, mostShare) }}
+      style={{ ...styleOf(tile), width: stored?.width ?? narrowed(usual.width, maxFraction) }}
       data-front={inFront || undefined}
       onPointerDownCapture={raise}
       onFocusCapture={raise}
@@ -105,12 +105,12 @@ export function FloatingTile(props: FloatingTileProps) {
           <TileButton
             label={`${title}: smaller`}
             icon={<Minus size={14} />}
-            press={() => place({ ...tile, width: present().width - STEP_PX })}
+            press={() => move({ ...tile, width: present().width - STEP_PX })}
           />
           <TileButton
             label={`${title}: larger`}
             icon={<Plus size={14} />}
-            press={() => place({ ...tile, width: present().width + STEP_PX })}
+            press={() => move({ ...tile, width: present().width + STEP_PX })}
           />
           {onClose !== undefined && (
             <TileButton label={`Close ${title}`} icon={<X size={14} />} press={onClose} />
@@ -158,12 +158,12 @@ function styleOf({ x, y }: Tile): React.CSSProperties {
 }
 
 /** CSS width of so many pixels, or less where the scene is narrow. */
-function narrowed(width: number, mostShare: number): string {
-  return `max(${LEAST_PX}px, min(${width}px, ${100 * mostShare}%))`;
+function narrowed(width: number, maxFraction: number): string {
+  return `max(${MIN_PX}px, min(${width}px, ${100 * maxFraction}%))`;
 }
 
 function clamped({ x, y, width }: Tile): Tile {
   const share = (value: number) => Math.max(0, Math.min(1, value));
-  const most = Math.max(LEAST_PX, window.innerWidth - 80);
-  return { x: share(x), y: share(y), width: Math.max(LEAST_PX, Math.min(width, most)) };
+  const maxPx = Math.max(MIN_PX, window.innerWidth - 80);
+  return { x: share(x), y: share(y), width: Math.max(MIN_PX, Math.min(width, maxPx)) };
 }

@@ -11,11 +11,11 @@ import { useTool } from "../state/tool.ts";
 import { baseFrame, useVehicles } from "../state/vehicles.ts";
 import { rayAt } from "./rayAt.ts";
 
-/** Twenty times a second are as smooth as the picture of what is moved. */
+/** Twenty times a second are as smooth as the motion that is shown. */
 const SEND_MS = 50;
 /** Handles are as large as that share of their distance. */
 const SHARE = 0.09;
-const LEAST_SCALE = 0.5;
+const MIN_SCALE = 0.5;
 
 type Grip = "level" | "upright";
 
@@ -99,7 +99,7 @@ function useFollowing(
     const { x, y, z } = handle.position;
     const eye = camera.matrixWorld.elements;
     const distance = Math.hypot(eye[12]! - x, eye[13]! - y, eye[14]! - z);
-    handle.scale.setScalar(Math.max(LEAST_SCALE, distance * SHARE));
+    handle.scale.setScalar(Math.max(MIN_SCALE, distance * SHARE));
   });
 }
 
@@ -114,10 +114,10 @@ function useDragging(
   const caster = useMemo(() => new Raycaster(), []);
   useEffect(() => {
     const canvas = gl.domElement;
-    const sender = new Latest<Position>(async (place) => {
+    const sender = new Latest<Position>(async (position) => {
       const pose = link.frames.pose(baseFrame(uav));
       const [, , , x = 0, y = 0, z = 0, w = 1] = pose ?? [];
-      await succeeds(`Move ${uav}`, putAt(uav, place, { x, y, z, w }));
+      await succeeds(`Move ${uav}`, putAt(uav, position, { x, y, z, w }));
     }, SEND_MS);
     let drag: { grip: Grip; from: Position; offset: [number, number, number] } | null = null;
     const ray = (event: PointerEvent) => rayAt(canvas, camera, event.clientX, event.clientY);
@@ -131,7 +131,7 @@ function useDragging(
       const { x, y, z } = group.current.position;
       const from = { x, y, z };
       drag = { grip, from, offset: [0, 0, 0] };
-      const start = placeOf(drag, ray(event));
+      const start = positionOf(drag, ray(event));
       if (start !== null) drag.offset = [x - start.x, y - start.y, z - start.z];
       canvas.setPointerCapture(event.pointerId);
       setHeld(grip);
@@ -139,10 +139,10 @@ function useDragging(
     const move = (event: PointerEvent) => {
       if (drag === null) return;
       event.stopPropagation();
-      const place = placeOf(drag, ray(event));
-      if (place === null) return;
-      wished.current = place;
-      sender.offer(place);
+      const position = positionOf(drag, ray(event));
+      if (position === null) return;
+      wished.current = position;
+      sender.offer(position);
     };
     const up = (event: PointerEvent) => {
       if (drag === null) return;
@@ -166,7 +166,7 @@ function useDragging(
   }, [camera, caster, gl, group, setHeld, uav, wished]);
 }
 
-function placeOf(
+function positionOf(
   drag: { grip: Grip; from: Position; offset: [number, number, number] },
   ray: Ray,
 ): Position | null {

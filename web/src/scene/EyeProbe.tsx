@@ -4,7 +4,7 @@ import { eye } from "../state/eye.ts";
 
 const ahead = new Vector3();
 
-/** Tells the map from where the scene is seen. */
+/** Reports to the map from where the scene is seen. */
 export function EyeProbe() {
   useFrame(({ camera }) => {
     const [x, y, z] = camera.matrixWorld.elements.slice(12, 15) as [number, number, number];

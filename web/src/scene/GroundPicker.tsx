@@ -7,7 +7,7 @@ import { rayAt } from "./rayAt.ts";
 
 const CLICK_PX = 4;
 
-/** While a place is being asked for, a click in the scene gives it; dragging looks around as ever. */
+/** While a position is requested, a click in the scene gives it; dragging looks around as ever. */
 export function GroundPicker() {
   const asking = useTool((tool) => tool.asking !== null);
   const { camera, gl } = useThree();
@@ -24,10 +24,10 @@ export function GroundPicker() {
       if (from === null) return;
       if (Math.hypot(event.clientX - from[0], event.clientY - from[1]) > CLICK_PX) return;
       const { origin, direction } = rayAt(canvas, camera, event.clientX, event.clientY);
-      const place = meetGround(heightAt, origin, direction);
-      if (place === null) return;
+      const point = meetGround(heightAt, origin, direction);
+      if (point === null) return;
       event.stopPropagation();
-      givePosition({ x: place[0], y: place[1], z: place[2] });
+      givePosition({ x: point[0], y: point[1], z: point[2] });
     };
     canvas.style.cursor = "crosshair";
     canvas.addEventListener("pointerdown", down);

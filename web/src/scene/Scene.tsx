@@ -9,10 +9,10 @@ import { GroundPicker } from "./GroundPicker.tsx";
 import { isSoftware } from "./stage/quality.ts";
 import { Stage } from "./stage/Stage.ts";
 
-// Coordinates of the picture are those of the map: ENU, metres.
+// Coordinates of the scene are those of the map: ENU, metres.
 Object3D.DEFAULT_UP.set(0, 0, 1);
 
-/** The picture: the world, what flies in it, and from where it is seen. */
+/** The scene: the world, what flies in it, and from where it is seen. */
 export function Scene() {
   return (
     <>

@@ -25,7 +25,7 @@ const read = follow.mock.calls[0]![1];
 
 beforeEach(closeWindow);
 
-it("another scenario than flies is offered once, and the address tells what flies", () => {
+it("another scenario than the running one is offered once, and the address names the running one", () => {
   flying("hover");
   expect(useWindows.getState()).toMatchObject({ open: "scenarios", scenario: "city_flight" });
   expect(new URLSearchParams(page.hash.slice(1)).get("scenario")).toBe("hover");

@@ -29,7 +29,7 @@ export function followAddress(): void {
 
 function offerLinked(): void {
   const scenario = useSimulation.getState().server?.scenario ?? "";
-  if (scenario === "") return; // not told yet
+  if (scenario === "") return; // not received yet
   if (linked !== "" && linked !== scenario) offerScenario(linked);
   linked = "";
 }

@@ -11,12 +11,12 @@ interface UavColouring {
   types: readonly string[];
 }
 
-const LEAST = 1;
+const MIN_TOP = 1;
 
-export const useColouring = create<UavColouring>(() => ({ by: "uav", top: LEAST, types: [] }));
+export const useColouring = create<UavColouring>(() => ({ by: "uav", top: MIN_TOP, types: [] }));
 
 export function colourBy(by: Colouring): void {
-  useColouring.setState({ by, top: LEAST, types: [] });
+  useColouring.setState({ by, top: MIN_TOP, types: [] });
   fit();
 }
 

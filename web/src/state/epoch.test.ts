@@ -14,24 +14,24 @@ followEpoch();
 followGoals();
 
 type Status = NonNullable<ReturnType<typeof useSimulation.getState>["status"]>;
-const reach = (sec: number) =>
+const setTime = (sec: number) =>
   useSimulation.setState({ status: { stamp: { sec, nanosec: 0 } } as Status });
 
 beforeEach(() => useGoals.setState({}, true));
 
 it("keeps goals while a flight goes on, and forgets them at a reset", async () => {
-  reach(10);
+  setTime(10);
   await sendTo("uav1", { x: 1, y: 2, z: 3 });
-  reach(11);
+  setTime(11);
   expect(useGoals.getState()).toHaveProperty("uav1");
-  reach(0);
+  setTime(0);
   expect(useGoals.getState()).toEqual({});
 });
 
 it("forgets goals where another scenario is flown", async () => {
   type Server = NonNullable<ReturnType<typeof useSimulation.getState>["server"]>;
   useSimulation.setState({ server: { scenario: "hover" } as Server });
-  reach(1);
+  setTime(1);
   await sendTo("uav1", { x: 1, y: 2, z: 3 });
   useSimulation.setState({ server: { scenario: "longleaf" } as Server });
   expect(useGoals.getState()).toEqual({});

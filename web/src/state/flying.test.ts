@@ -28,7 +28,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-it("tells a velocity 20 times a second while a key is held, and zero once at the end", () => {
+it("sends a velocity 20 times a second while a key is held, and zero once at the end", () => {
   takeControls("uav1");
   vi.advanceTimersByTime(500);
   expect(sent).toEqual([]);

@@ -1,4 +1,4 @@
-// Flight by hand: who is flown, how fast, and the 20 Hz at which it is told.
+// Manual control: which UAV, how fast, and the 20 Hz at which velocities are published.
 
 import { create } from "zustand";
 import { fly, stopFlying } from "../link/commands/flight.ts";
@@ -51,7 +51,7 @@ export function takeControls(uav: string): void {
   timer = setInterval(tick, PERIOD_MS);
 }
 
-/** Nobody flies by hand any more; whoever moved comes to rest. */
+/** Ends manual control; a UAV that moved comes to rest. */
 export function releaseControls(): void {
   rest();
   clearInterval(timer);
@@ -89,7 +89,7 @@ function same(a: Wish, b: Wish): boolean {
   return a.ahead === b.ahead && a.left === b.left && a.up === b.up && a.turn === b.turn;
 }
 
-// Controls belong to one UAV: who looks at another one does not fly it unawares.
+// Controls belong to one UAV: selecting another one does not move them to it.
 useVehicles.subscribe(({ selected }) => {
   const { uav } = useFlying.getState();
   if (uav !== "" && uav !== selected) releaseControls();

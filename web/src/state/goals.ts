@@ -15,7 +15,7 @@ import { pickPosition } from "./tool.ts";
 import { baseFrame } from "./vehicles.ts";
 import { heightAt } from "./worldPlan.ts";
 
-/** Places that UAVs were last sent to from this page. */
+/** Positions that UAVs were last sent to from this page. */
 export const useGoals = create<Record<string, Position>>(() => ({}));
 
 /** Forget the goals of a flight that is over, and of a UAV that is put back to its start. */
@@ -28,21 +28,21 @@ export function followGoals(): void {
 }
 
 /** No UAV is sent nearer to the ground than this. */
-const LEAST_HEIGHT_M = 1.5;
+const MIN_HEIGHT_M = 1.5;
 
 /** Fly there, as the UAV looks now; a robot without the service gets a goal of its navigation. */
-export async function sendTo(uav: string, place: Position): Promise<void> {
-  useGoals.setState({ [uav]: place });
+export async function sendTo(uav: string, position: Position): Promise<void> {
+  useGoals.setState({ [uav]: position });
   if (useConnection.getState().volery) {
-    await goTo(uav, place, null);
+    await goTo(uav, position, null);
     return;
   }
   const pose = link.frames.pose(baseFrame(uav));
   const yaw = pose === null ? 0 : eulerOf(pose[3], pose[4], pose[5], pose[6]).yaw;
-  publishGoal(uav, place, yaw);
+  publishGoal(uav, position, yaw);
 }
 
-/** Fly UAVs to above a place of the ground; several keep their places to one another. */
+/** Fly UAVs to above a position on the ground; several keep their formation. */
 export async function sendAllAbove(
   uavs: readonly string[],
   ground: { x: number; y: number },
@@ -51,18 +51,18 @@ export async function sendAllAbove(
   await commandAll("go to", uavs, (uav) => sendAbove(uav, goals.get(uav)!));
 }
 
-/** Fly to above a place of the ground at the present height, or higher where the ground is. */
+/** Fly to above a position on the ground at the present height, or higher where the ground is. */
 async function sendAbove(uav: string, ground: { x: number; y: number }): Promise<void> {
-  const z = Math.max(positionOf(uav).z, heightAt(ground.x, ground.y) + LEAST_HEIGHT_M);
+  const z = Math.max(positionOf(uav).z, heightAt(ground.x, ground.y) + MIN_HEIGHT_M);
   await sendTo(uav, { ...ground, z });
 }
 
-/** Let the user click on where UAVs are to fly; several keep their places to one another. */
+/** Let the user click on where UAVs are to fly; several keep their formation. */
 export async function goByClick(uavs: readonly string[]): Promise<void> {
   if (uavs.length === 0) return;
   const what = uavs.length === 1 ? uavs[0]! : counted(uavs.length, "UAV");
-  const place = await attempt("Go to", pickPosition(`Goal of ${what}`));
-  if (place !== null) await sendAllAbove(uavs, place);
+  const position = await attempt("Go to", pickPosition(`Goal of ${what}`));
+  if (position !== null) await sendAllAbove(uavs, position);
 }
 
 function positionOf(uav: string): Position {

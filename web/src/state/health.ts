@@ -1,4 +1,4 @@
-// How honest the picture is: how old what is shown, how fast it comes, what was lost on the way.
+// How honest the view is: how old what is shown, how fast it comes, what was lost in between.
 
 import { create } from "zustand";
 import { ClockOffset } from "../lib/clockOffset.ts";
@@ -20,7 +20,7 @@ export interface Health {
   messagesPerS: number;
   /** Messages that the server had to drop for this page since it opened. */
   dropped: number;
-  /** Memory of the page's script, bytes; NaN: the browser does not tell. */
+  /** Memory of the page's script, bytes; NaN: the browser does not report it. */
   heapBytes: number;
 }
 
@@ -37,7 +37,7 @@ const NOTHING: Health = {
 
 export const useHealth = create<Health>(() => NOTHING);
 
-const TELL_MS = 500;
+const PUBLISH_MS = 500;
 const ASK_MS = 2000;
 /** A few seconds at 60 frames a second. */
 const FRAMES = 240;
@@ -57,7 +57,7 @@ export function followHealth(): void {
   });
   requestAnimationFrame(frame);
   setInterval(() => void askTime(), ASK_MS);
-  setInterval(tell, TELL_MS);
+  setInterval(publish, PUBLISH_MS);
 }
 
 /** After the scene was drawn. */
@@ -98,7 +98,7 @@ function serverMs(stampS: number): number {
   return 1000 * (secondsOf(status.wall) + since);
 }
 
-/** Ask for the simulated time: with the status' pair of times it tells the server's clock. */
+/** Ask for the simulated time: with the status' pair of times it gives the server's clock. */
 async function askTime(): Promise<void> {
   if (link.state !== "open" || useSimulation.getState().status?.state !== PLAYING) return;
   const sentMs = nowMs();
@@ -106,14 +106,14 @@ async function askTime(): Promise<void> {
     const answer = await link.call("/rosapi/get_time", "rosapi_msgs/srv/GetTime", {}, 2);
     const receivedMs = nowMs();
     const { time } = answer as { time: { sec: number; nanosec: number } };
-    const told = serverMs(secondsOf(time));
-    if (!Number.isNaN(told)) offset.add({ sentMs, serverMs: told, receivedMs });
+    const timeMs = serverMs(secondsOf(time));
+    if (!Number.isNaN(timeMs)) offset.add({ sentMs, serverMs: timeMs, receivedMs });
   } catch {
     // asked again soon
   }
 }
 
-function tell(): void {
+function publish(): void {
   const total = intervals.reduce((sum, interval) => sum + interval, 0);
   const dropped = Number(useSimulation.getState().status?.dropped ?? NaN);
   if (Number.isNaN(droppedBefore) || dropped < droppedBefore) droppedBefore = dropped;
@@ -129,7 +129,7 @@ function tell(): void {
   });
 }
 
-/** Chromium alone tells. */
+/** Only Chromium reports it. */
 function heapBytes(): number {
   const { memory } = performance as { memory?: { usedJSHeapSize: number } };
   return memory?.usedJSHeapSize ?? NaN;

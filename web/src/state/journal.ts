@@ -14,7 +14,7 @@ export interface Entry {
   sort: EntrySort;
   kind: string;
   /** UAV of an event, client of a command. */
-  who: string;
+  source: string;
   text: string;
 }
 
@@ -37,13 +37,13 @@ export interface Command {
   content: string;
 }
 
-/** How many records wait for a slow page: many things can happen at once. */
+/** How many records wait for a slow page: many events can happen at once. */
 export const COMMAND_DEPTH = 1000;
-const MOST = 5000;
+const MAX_ENTRIES = 5000;
 const SHOW_MS = 200;
 const PROBLEMS = new Set(["impact", "collision", "fault", "battery"]);
 
-/** The newest entries, the oldest first; told a few times a second. */
+/** The newest entries, the oldest first; published a few times a second. */
 export const useJournal = create<{ entries: Entry[] }>(() => ({ entries: [] }));
 
 let written: Entry[] = [];
@@ -72,8 +72,8 @@ export function followJournal(): void {
 }
 
 /** Title of the notice that an event deserves, as a falling battery does; null: none. */
-export function warningOf({ kind, who, timeS }: Omit<Entry, "number">): string | null {
-  return kind === "battery" ? `${who}, ${timeS.toFixed(1)} s` : null;
+export function warningOf({ kind, source, timeS }: Omit<Entry, "number">): string | null {
+  return kind === "battery" ? `${source}, ${timeS.toFixed(1)} s` : null;
 }
 
 export function clearJournal(): void {
@@ -94,7 +94,7 @@ export function entryOfEvent(text: string): Omit<Entry, "number"> | null {
     timeS: event.time_ns * 1e-9,
     sort: PROBLEMS.has(event.kind) ? "problem" : "event",
     kind: event.kind,
-    who: event.uav,
+    source: event.uav,
     text: textOf(event),
   };
 }
@@ -104,14 +104,14 @@ function textOf({
   detail,
   partner,
   speed_m_s: speed,
-  position_map: place,
+  position_map: position,
 }: EventJson): string {
-  const where = `at (${place.map((metres) => metres.toFixed(1)).join(", ")}) m`;
-  const pace = `at ${speed.toFixed(2)} m/s`;
+  const where = `at (${position.map((metres) => metres.toFixed(1)).join(", ")}) m`;
+  const impactSpeed = `at ${speed.toFixed(2)} m/s`;
   if (kind === "world") return detail;
-  if (kind === "collision") return `hit ${partner} ${pace} ${where}`;
-  if (kind === "impact") return `hit the ground ${pace} ${where}`;
-  if (kind === "touch_down") return `touched down ${pace} ${where}`;
+  if (kind === "collision") return `hit ${partner} ${impactSpeed} ${where}`;
+  if (kind === "impact") return `hit the ground ${impactSpeed} ${where}`;
+  if (kind === "touch_down") return `touched down ${impactSpeed} ${where}`;
   return `${detail} ${where}`;
 }
 
@@ -120,16 +120,16 @@ function entryOfCommand({ stamp, client, kind, name, content }: Command): Omit<E
     timeS: secondsOf(stamp),
     sort: kind === "refused" ? "problem" : "command",
     kind,
-    who: client,
+    source: client,
     text: `${name} ${content}`,
   };
 }
 
 function write(entry: Omit<Entry, "number">): void {
   written.push({ ...entry, number: next++ });
-  if (written.length > 2 * MOST) written = written.slice(-MOST);
+  if (written.length > 2 * MAX_ENTRIES) written = written.slice(-MAX_ENTRIES);
   timer ??= setTimeout(() => {
     timer = null;
-    useJournal.setState({ entries: written.slice(-MOST) });
+    useJournal.setState({ entries: written.slice(-MAX_ENTRIES) });
   }, SHOW_MS);
 }

@@ -27,7 +27,7 @@ describe("two panels at the bottom", () => {
     expect(halves()).toEqual(["plots", "log"]);
   });
 
-  it("change places where a half gets what the other one shows", () => {
+  it("are swapped where a half gets what the other one shows", () => {
     openPanel("bottom", "plots");
     putPanel("second", "log");
     putPanel("bottom", "log");

@@ -26,16 +26,16 @@ interface Layout extends Record<Slot, string> {
   /** Height of a phone's sheet, in pixels. */
   sheet: number;
   shown: Record<Overlay, boolean>;
-  /** Windows by name: the map, a topic of pictures. */
+  /** Windows by name: the map, a topic of images. */
   tiles: Record<string, Tile>;
-  /** Topics of pictures that are shown. */
+  /** Image topics that are shown. */
   pictures: string[];
 }
 
 const KEY = "volery.layout";
 /** As in `page.css`: up to this width a panel is a sheet below the scene. */
 export const NARROW_PX = 700;
-export const LEAST_SIZE: Record<Dock, number> = { left: 200, right: 260, bottom: 140 };
+export const MIN_SIZE: Record<Dock, number> = { left: 200, right: 260, bottom: 140 };
 /** Width that each half of the bottom keeps. */
 const MIN_HALF_PX = 300;
 
@@ -86,7 +86,7 @@ export function openPanel(dock: Dock, id: string): void {
   else if (slotOf(dock, id) === null) useLayout.setState({ [dock]: id });
 }
 
-/** Show a panel of the bottom in one of its halves; one that the other half shows changes places. */
+/** Show a panel of the bottom in one of its halves; one that the other half shows is swapped. */
 export function putPanel(slot: "bottom" | "second", id: string): void {
   const layout = useLayout.getState();
   const other = slot === "bottom" ? "second" : "bottom";
@@ -115,7 +115,7 @@ export function splitBottom(fraction: number, width: number): void {
 
 export function resizeDock(dock: Dock, size: number): void {
   const room = dock === "bottom" ? window.innerHeight : window.innerWidth;
-  const fitting = Math.round(Math.max(LEAST_SIZE[dock], Math.min(size, room * 0.6)));
+  const fitting = Math.round(Math.max(MIN_SIZE[dock], Math.min(size, room * 0.6)));
   useLayout.setState(({ sizes }) => ({ sizes: { ...sizes, [dock]: fitting } }));
 }
 
@@ -130,11 +130,11 @@ export function toggleOverlay(overlay: Overlay): void {
   useLayout.setState(({ shown }) => ({ shown: { ...shown, [overlay]: !shown[overlay] } }));
 }
 
-export function placeTile(name: string, tile: Tile): void {
+export function moveTile(name: string, tile: Tile): void {
   useLayout.setState(({ tiles }) => ({ tiles: { ...tiles, [name]: tile } }));
 }
 
-export function showPicture(topic: string, shown: boolean): void {
+export function showCamera(topic: string, shown: boolean): void {
   useLayout.setState(({ pictures }) => ({
     pictures: [...pictures.filter((other) => other !== topic), ...(shown ? [topic] : [])],
   }));

@@ -29,7 +29,7 @@ const height = of("/uav1/odom", "pose.pose.position.z");
 
 beforeEach(() => usePlots.setState({ plots: [{ id: 1, lines: [height] }], windowS: 20 }));
 
-it("a plot of positions has equal scales unless one is told otherwise", () => {
+it("a plot of positions has equal scales unless it is set otherwise", () => {
   addXYPlot([above("uav1")]);
   expect(hasEqualScales(last())).toBe(true);
   const speed = of("/uav1/odom", "twist.twist.linear.x");
@@ -39,7 +39,7 @@ it("a plot of positions has equal scales unless one is told otherwise", () => {
   expect(hasEqualScales(last())).toBe(true);
 });
 
-it("a plot of distances has no lines, takes an empty plot's place, and keeps its own", () => {
+it("a plot of distances has no lines, replaces an empty plot, and keeps its own", () => {
   usePlots.setState({ plots: [{ id: 1, lines: [] }] });
   addDistancePlot();
   const distances = { id: 1, kind: "distances", of: "nearest" };
@@ -86,7 +86,7 @@ it("x-y plots are saved in layouts", () => {
   expect(usePlots.getState().plots).toEqual(plots);
 });
 
-it("an x-y plot takes the place of a plot that shows nothing", () => {
+it("an x-y plot replaces a plot that shows nothing", () => {
   usePlots.setState({ plots: [{ id: 1, lines: [] }] });
   addXYPlot([above("uav1")]);
   expect(usePlots.getState().plots.map(({ kind }) => kind)).toEqual(["xy"]);

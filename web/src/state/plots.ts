@@ -115,7 +115,7 @@ export function removeCurve(plot: number, curve: Curve): void {
   );
 }
 
-/** What tells a curve from all others. */
+/** What identifies a curve. */
 export function curveKey({ x, y }: Curve): string {
   return `${nameOf(x)} ${nameOf(y)}`;
 }
@@ -153,7 +153,7 @@ function isOverTime(plot: Plot): plot is TimePlot {
   return plot.kind === undefined || plot.kind === "time";
 }
 
-/** Add a plot, which takes the place of empty ones. */
+/** Add a plot, which replaces empty ones. */
 function addInstead(made: (id: number) => Plot): void {
   usePlots.setState(({ plots }) => ({
     plots: plots.filter((one) => one.kind === "distances" || linesOf(one).length > 0),

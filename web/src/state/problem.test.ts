@@ -9,15 +9,15 @@ describe("problem", () => {
     expect(problemOf("open", "", "the simulation", false)).toBeNull();
   });
 
-  it("tells a lost link, and why", () => {
-    const told = problemOf("lost", "the world changes", "the simulation", false);
-    expect(told?.what).toBe("No connection to the simulation: the world changes");
-    expect(told?.linked).toBe(false);
+  it("reports a lost link, and why", () => {
+    const problem = problemOf("lost", "the world changes", "the simulation", false);
+    expect(problem?.what).toBe("No connection to the simulation: the world changes");
+    expect(problem?.linked).toBe(false);
   });
 
-  it("tells silence of a link that stands", () => {
-    const told = problemOf("open", "", "ws://robot:9090", true);
-    expect(told).toMatchObject({ what: "No data from ws://robot:9090", linked: true });
+  it("reports silence of an open link", () => {
+    const problem = problemOf("open", "", "ws://robot:9090", true);
+    expect(problem).toMatchObject({ what: "No data from ws://robot:9090", linked: true });
   });
 });
 
@@ -34,14 +34,14 @@ describe("an entry of the log", () => {
 
   it("says what was hit, how fast and where", () => {
     const entry = entryOfEvent(JSON.stringify(EVENT));
-    expect(entry).toMatchObject({ timeS: 2.5, sort: "problem", who: "uav1" });
+    expect(entry).toMatchObject({ timeS: 2.5, sort: "problem", source: "uav1" });
     expect(entry?.text).toBe("hit tree 7 at 1.25 m/s at (1.0, 2.0, 3.0) m");
   });
 
   it("of a falling battery gets a notice, that of a collision none", () => {
     const fallen = { ...EVENT, kind: "battery", partner: "", detail: "battery critical" };
     const entry = entryOfEvent(JSON.stringify(fallen));
-    expect(entry).toMatchObject({ sort: "problem", who: "uav1" });
+    expect(entry).toMatchObject({ sort: "problem", source: "uav1" });
     expect(entry?.text).toBe("battery critical at (1.0, 2.0, 3.0) m");
     expect(entry && warningOf(entry)).toBe("uav1, 2.5 s");
     const collision = entryOfEvent(JSON.stringify(EVENT));

@@ -21,12 +21,12 @@ followRestarts();
 
 const call = (name: string, content: string) => ({
   stamp: { sec: 10, nanosec: 0 },
-  client: "somebody else's",
+  client: "another client",
   kind: "call",
   name,
   content,
 });
-const tell = (message: unknown) => listeners.get("/volery/log")!({ message });
+const publish = (message: unknown) => listeners.get("/volery/log")!({ message });
 
 beforeEach(async () => {
   await sendTo("uav1", { x: 1, y: 2, z: 3 });
@@ -35,13 +35,13 @@ beforeEach(async () => {
 
 it("a UAV that any client puts back to its start has neither goal nor trail", () => {
   link.frames.stampS = 9.9;
-  tell(call("/volery/reset_uav", '{"name": "uav1"}'));
+  publish(call("/volery/reset_uav", '{"name": "uav1"}'));
   expect(Object.keys(useGoals.getState())).toEqual(["uav2"]);
   expect(isRestarting("uav1")).toBe(true);
   expect(isRestarting("uav2")).toBe(false);
 });
 
-it("other commands, and what nobody can read, change nothing", () => {
+it("other commands, and what cannot be read, change nothing", () => {
   expect(restartedBy(call("/uav1/go_to", '{"name": "uav1"}'))).toBeNull();
   expect(restartedBy(call("/volery/reset_uav", "{shortened"))).toBeNull();
   expect(restartedBy(call("/volery/reset_uav", "{}"))).toBeNull();

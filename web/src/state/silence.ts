@@ -6,16 +6,16 @@ import { link } from "../link/link.ts";
 export const useSilence = create(() => ({ sinceMs: 0 }));
 
 const LOOK_MS = 100;
-/** A simulation tells its status five times a second, even while paused. */
+/** A simulation publishes its status five times a second, even while paused. */
 const SILENT_AFTER_MS = 1000;
 
 export function followSilence(): void {
   let openSinceMs = nowMs();
   link.watch(() => (openSinceMs = nowMs()));
   setInterval(() => {
-    const heardMs = Math.max(openSinceMs, link.heardMs);
-    const silent = link.state === "open" && nowMs() - heardMs > SILENT_AFTER_MS;
-    const sinceMs = silent ? heardMs : 0;
+    const receivedMs = Math.max(openSinceMs, link.receivedMs);
+    const silent = link.state === "open" && nowMs() - receivedMs > SILENT_AFTER_MS;
+    const sinceMs = silent ? receivedMs : 0;
     if (sinceMs !== useSilence.getState().sinceMs) useSilence.setState({ sinceMs });
   }, LOOK_MS);
 }

@@ -18,7 +18,7 @@ export interface ServerStatus {
   token_needed: boolean;
   /** Whether `./tensorboard/` shows trainings; other servers do not say. */
   tensorboard?: boolean;
-  /** Whether nobody has named the scenario that flies. */
+  /** Whether the server chose the scenario that flies by itself. */
   unasked?: boolean;
 }
 

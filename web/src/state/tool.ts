@@ -3,7 +3,7 @@ import type { Position } from "../link/commands/flight.ts";
 
 /** What a click in the scene or on the map means now, besides looking around. */
 interface Tool {
-  /** What a place is being asked for, as shown to the user; null: for nothing. */
+  /** What a position is requested for, as shown to the user; null: for nothing. */
   asking: string | null;
   /** Whether the selected UAV has handles to drag it by. */
   moving: boolean;
@@ -11,7 +11,7 @@ interface Tool {
 
 export const useTool = create<Tool>(() => ({ asking: null, moving: false }));
 
-let answer: ((place: Position | null) => void) | null = null;
+let answer: ((position: Position | null) => void) | null = null;
 
 /** Lets the user click a position on the ground; null: the user cancels. */
 export function pickPosition(what: string): Promise<Position | null> {
@@ -23,11 +23,11 @@ export function pickPosition(what: string): Promise<Position | null> {
 }
 
 /** Ends the request with a clicked position; null cancels it. */
-export function givePosition(place: Position | null): void {
+export function givePosition(position: Position | null): void {
   const waiting = answer;
   answer = null;
   useTool.setState({ asking: null });
-  waiting?.(place);
+  waiting?.(position);
 }
 
 export function setMoving(moving: boolean): void {

@@ -2,7 +2,7 @@ import { create } from "zustand";
 import { topics, type TopicName } from "../link/commands/graph.ts";
 import { link } from "../link/link.ts";
 
-/** Topics of the graph by name; asked for every few seconds while somebody looks at them. */
+/** Topics of the graph by name; requested every few seconds while they are shown. */
 export const useTopics = create<{ list: TopicName[] }>(() => ({ list: [] }));
 
 const ASK_MS = 3000;

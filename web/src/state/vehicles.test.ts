@@ -1,9 +1,11 @@
 import { beforeEach, expect, it, vi } from "vitest";
 import type { volery_interfaces_VehicleState as VehicleState } from "../messages/generated.ts";
 
-let tell: (received: { message: { vehicles: Partial<VehicleState>[] } }) => void;
+let publish: (received: { message: { vehicles: Partial<VehicleState>[] } }) => void;
 vi.mock("../link/link.ts", () => ({
-  link: { subscribe: (_topic: string, _type: string, listener: typeof tell) => (tell = listener) },
+  link: {
+    subscribe: (_topic: string, _type: string, listener: typeof publish) => (publish = listener),
+  },
 }));
 
 const { allSelected, followVehicles, select, selectGroup, toggleSelected, useVehicles } =
@@ -11,7 +13,7 @@ const { allSelected, followVehicles, select, selectGroup, toggleSelected, useVeh
 followVehicles(true);
 
 function flying(...names: string[]): void {
-  tell({ message: { vehicles: names.map((name) => ({ name })) } });
+  publish({ message: { vehicles: names.map((name) => ({ name })) } });
 }
 
 beforeEach(() => {

@@ -69,16 +69,16 @@ export function allSelected(): readonly string[] {
   return selected === "" ? [] : [selected];
 }
 
-/** Follow what a simulation tells; robots that tell nothing are known by their frames. */
+/** Follow the vehicles that a simulation publishes; other robots are known by their frames. */
 export function followVehicles(volery: boolean): void {
-  let told = false;
+  let received = false;
   link.subscribe("/volery/vehicles", "volery_interfaces/msg/VehicleStates", ({ message }) => {
-    told = true;
+    received = true;
     take(message.vehicles);
   });
   if (volery) return;
   setInterval(() => {
-    if (!told && link.state === "open") take(robots());
+    if (!received && link.state === "open") take(robots());
   }, ROBOTS_MS);
 }
 
@@ -96,7 +96,7 @@ function take(list: VehicleState[]): void {
   });
 }
 
-/** Whoever has a base frame, with what that tells. */
+/** Every robot with a base frame, at the pose of that frame. */
 function robots(): VehicleState[] {
   return link.frames.names
     .filter((frame) => frame.endsWith(BASE))

@@ -41,7 +41,7 @@ interface View {
   quality: QualityWish;
   /** The camera when it last came to rest, or where a link puts it; null: the view's own choice. */
   camera: CameraPose | null;
-  /** Grows when somebody else than the user's hand on the view has set `camera`. */
+  /** Grows when something else than the user's hand on the view has set `camera`. */
   cameraVersion: number;
   /** UAV below the pointer; empty: none. */
   hovered: string;
@@ -72,7 +72,7 @@ export function wishQuality(quality: QualityWish): void {
   useView.setState({ quality });
 }
 
-/** Put the camera of the present view somewhere; null: where the view begins by itself. */
+/** Set the camera of the present view; null: where the view begins by itself. */
 export function putCamera(camera: CameraPose | null): void {
   useView.setState(({ cameraVersion }) => ({ camera, cameraVersion: cameraVersion + 1 }));
 }

@@ -7,9 +7,9 @@ const { useSimulation } = await import("./simulation.ts");
 const { welcome } = await import("./welcome.ts");
 const { closeWindow, useWindows } = await import("./windows.ts");
 
-const TOLD = { unasked: true, role: "operator", token_needed: false } as ServerStatus;
+const STATUS = { unasked: true, role: "operator", token_needed: false } as ServerStatus;
 
-function tell(server: ServerStatus | null): string | null {
+function openedBy(server: ServerStatus | null): string | null {
   useSimulation.setState({ server });
   return useWindows.getState().open;
 }
@@ -19,19 +19,19 @@ beforeEach(() => {
   useSimulation.setState({ server: null });
 });
 
-test("where nobody has named what flies, the page begins with the choice, once", () => {
+test("where no scenario was named, the page begins with the choice, once", () => {
   welcome("#quality=low");
-  expect(tell({ ...TOLD, token_needed: true })).toBeNull();
-  expect(tell(TOLD)).toBe("scenarios");
+  expect(openedBy({ ...STATUS, token_needed: true })).toBeNull();
+  expect(openedBy(STATUS)).toBe("scenarios");
   closeWindow();
-  expect(tell({ ...TOLD })).toBeNull();
+  expect(openedBy({ ...STATUS })).toBeNull();
 });
 
 test.each([
-  ["a scenario was named", "", { ...TOLD, unasked: false }],
-  ["a viewer cannot choose", "", { ...TOLD, role: "viewer" as const }],
-  ["a link says what to show", "#view=chase&uav=uav2", TOLD],
+  ["a scenario was named", "", { ...STATUS, unasked: false }],
+  ["a viewer cannot choose", "", { ...STATUS, role: "viewer" as const }],
+  ["a link says what to show", "#view=chase&uav=uav2", STATUS],
 ])("no choice is offered where %s", (_why, hash, server) => {
   welcome(hash);
-  expect(tell(server)).toBeNull();
+  expect(openedBy(server)).toBeNull();
 });

@@ -1,4 +1,4 @@
-// The first visit: where nobody has said what flies, the page begins with the choice.
+// The first visit: where no scenario was named, the page begins with the choice.
 
 import { useSimulation } from "./simulation.ts";
 import { openWindow, useWindows } from "./windows.ts";

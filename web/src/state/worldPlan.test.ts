@@ -9,18 +9,20 @@ function world(): PlanSource {
       {
         geometry: new PlaneGeometry(100, 60),
         material: "ground",
-        place: new Matrix4().setPosition(0, 0, 1),
+        transform: new Matrix4().setPosition(0, 0, 1),
       },
       {
         geometry: new BoxGeometry(4, 2, 6),
         material: "concrete",
-        place: new Matrix4().setPosition(10, 20, 4),
+        transform: new Matrix4().setPosition(10, 20, 4),
       },
     ],
     models: [
       {
         parts: [{ geometry: trunk }],
-        places: new Float32Array(new Matrix4().makeScale(2, 2, 2).setPosition(-7, -5, 1).elements),
+        transforms: new Float32Array(
+          new Matrix4().makeScale(2, 2, 2).setPosition(-7, -5, 1).elements,
+        ),
       },
     ],
   };
@@ -40,7 +42,7 @@ it("a world is seen from above", () => {
   }
 });
 
-it("tells heights of the ground", () => {
+it("has the heights of the ground", () => {
   planWorld(world());
   expect(heightAt(10, 20)).toBeCloseTo(1);
   expect(heightAt(1000, 0)).toBe(0);

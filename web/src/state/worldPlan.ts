@@ -22,16 +22,16 @@ export interface WorldPlan {
 
 /** A world as the scene reads it: z up, in the map. */
 export interface PlanSource {
-  /** What stands once, where its place says. */
-  solids: readonly { geometry: BufferGeometry; material: string; place: Matrix4 }[];
-  /** What stands in many places: matrices, 16 numbers each. */
-  models: readonly { parts: readonly { geometry: BufferGeometry }[]; places: Float32Array }[];
+  /** What stands once, with its transform. */
+  solids: readonly { geometry: BufferGeometry; material: string; transform: Matrix4 }[];
+  /** What stands many times: transforms, 16 numbers each. */
+  models: readonly { parts: readonly { geometry: BufferGeometry }[]; transforms: Float32Array }[];
 }
 
-const MOST_CELLS = 384;
+const MAX_CELLS = 384;
 /** Below this height a tree is its trunk, m. */
 const TRUNK_TOP_M = 1.5;
-/** Least share of a normal that points up for a roof. */
+/** Minimum upward part of the normal of a roof. */
 const UPWARD = 0.2;
 
 export const useWorldPlan = create<{ plan: WorldPlan | null }>(() => ({ plan: null }));
@@ -44,12 +44,12 @@ export function planWorld(world: PlanSource | null): void {
 export function planOf({ solids, models }: PlanSource): WorldPlan {
   const ground: number[] = [];
   const roofs: number[] = [];
-  for (const { geometry, material, place } of solids) {
-    if (material.startsWith("ground")) addTriangles(geometry, place, ground, -1);
-    else addTriangles(geometry, place, roofs, UPWARD);
+  for (const { geometry, material, transform } of solids) {
+    if (material.startsWith("ground")) addTriangles(geometry, transform, ground, -1);
+    else addTriangles(geometry, transform, roofs, UPWARD);
   }
   return {
-    ground: heightsOf(new Float32Array(ground), MOST_CELLS),
+    ground: heightsOf(new Float32Array(ground), MAX_CELLS),
     trees: models.flatMap(treesOf),
     roofs: new Float32Array(roofs),
   };
@@ -65,7 +65,7 @@ export function heightAt(x: number, y: number): number {
 /** Triangles in the map whose normals point up at least so much. */
 function addTriangles(
   geometry: BufferGeometry,
-  place: Matrix4,
+  transform: Matrix4,
   into: number[],
   upward: number,
 ): void {
@@ -76,7 +76,7 @@ function addTriangles(
   const [one, other] = [new Vector3(), new Vector3()];
   for (let i = 0; i + 3 <= count; i += 3) {
     corners.forEach((corner, k) => {
-      corner.fromBufferAttribute(position, index?.getX(i + k) ?? i + k).applyMatrix4(place);
+      corner.fromBufferAttribute(position, index?.getX(i + k) ?? i + k).applyMatrix4(transform);
     });
     const [a, b, c] = corners;
     const normal = one.subVectors(b, a).cross(other.subVectors(c, a));
@@ -85,12 +85,12 @@ function addTriangles(
   }
 }
 
-function treesOf({ parts, places }: PlanSource["models"][number]): Tree[] {
+function treesOf({ parts, transforms }: PlanSource["models"][number]): Tree[] {
   const { crown, trunk } = radiiOf(parts.map(({ geometry }) => geometry));
-  return Array.from({ length: places.length / 16 }, (_, i) => {
+  return Array.from({ length: transforms.length / 16 }, (_, i) => {
     const at = 16 * i;
-    const scale = Math.hypot(places[at]!, places[at + 1]!, places[at + 2]!);
-    const [x, y] = [places[at + 12]!, places[at + 13]!];
+    const scale = Math.hypot(transforms[at]!, transforms[at + 1]!, transforms[at + 2]!);
+    const [x, y] = [transforms[at + 12]!, transforms[at + 13]!];
     return { x, y, crown: crown * scale, trunk: trunk * scale };
   });
 }

@@ -4,7 +4,7 @@ import type { Eye } from "./rig.ts";
 /** How long one view turns into another, s. */
 export const BLEND_S = 0.5;
 
-/** The way from one eye to another that may move meanwhile. */
+/** The transition from one eye to another that may move meanwhile. */
 export class Blend {
   private readonly from: Eye = { position: new Vector3(), quaternion: new Quaternion(), fov: 0 };
   private doneS = BLEND_S;
@@ -20,7 +20,7 @@ export class Blend {
     this.doneS = 0;
   }
 
-  /** Change `eye` into what is seen on the way. */
+  /** Change `eye` into what is seen in between. */
   apply(eye: Eye, stepS: number): void {
     if (!this.running) return;
     this.doneS += stepS;

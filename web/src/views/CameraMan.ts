@@ -5,7 +5,7 @@ import { pickUav } from "../scene/stage/picking.ts";
 import type { Moment, Part } from "../scene/stage/part.ts";
 import { shown } from "../scene/stage/shown.ts";
 import { cameraOfUav } from "../scene/sensing/cameras.ts";
-import { reachOf } from "../scene/uavs/airframeGeometry.ts";
+import { radiusOf } from "../scene/uavs/airframeGeometry.ts";
 import { fleet } from "../scene/uavs/fleet.ts";
 import { currentWorld } from "../scene/world/currentWorld.ts";
 import { useTool } from "../state/tool.ts";
@@ -25,7 +25,7 @@ const KNEES_M = 0.5;
 const HEAD_M = 1.75;
 /** The address learns of a moved camera after it has rested so long, s. */
 const REST_S = 0.6;
-/** UAVs as near as this to the selected one belong into its first picture, m. */
+/** UAVs as near as this to the selected one belong into its first view, m. */
 const NEIGHBOURS_M = 40;
 /** So long a page waits for the first UAV before it shows the world without, s. */
 const LONGEST_WAIT_S = 1;
@@ -48,7 +48,7 @@ export class CameraMan implements Part {
     name: "",
     position: new Vector3(),
     quaternion: new Quaternion(),
-    reach: 0.3,
+    radius: 0.3,
   };
   private readonly box = new FrameBox();
   /** Whether the poses of all UAVs are known. */
@@ -107,7 +107,7 @@ export class CameraMan implements Part {
       this.enter(name, given);
       this.cameraVersion = cameraVersion;
     }
-    if (this.entered === null) return; // nobody is there to look at yet
+    if (this.entered === null) return; // no UAV is there to look at yet
     this.blendLeaps();
     this.rigs[name].update(this.hands, this.around, stepS, this.eye);
     this.blend.apply(this.eye, stepS);
@@ -121,7 +121,7 @@ export class CameraMan implements Part {
     this.ended.abort();
   }
 
-  /** Whether the first picture waits for the poses of the UAVs. */
+  /** Whether the first view waits for the poses of the UAVs. */
   private waits(stepS: number): boolean {
     this.waitedS += stepS;
     return !this.complete && this.waitedS < LONGEST_WAIT_S;
@@ -180,7 +180,7 @@ export class CameraMan implements Part {
     this.uav.name = uav.name;
     this.uav.position.fromArray(poses, at);
     this.uav.quaternion.fromArray(poses, at + 3);
-    this.uav.reach = reachOf(uav.airframe);
+    this.uav.radius = radiusOf(uav.airframe);
     this.around.uav = this.uav;
     this.gather();
     if (cameraOfUav(uav.name, this.uavCamera)) this.around.uavCamera = this.uavCamera;

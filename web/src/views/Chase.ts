@@ -32,13 +32,13 @@ export class Chase implements Rig {
     this.gaze.turn(input, -TURN);
     this.away = clamp(0.3, this.away * input.zoom, 20);
     const { uav } = around;
-    if (uav === null) return; // the picture stays as it was
+    if (uav === null) return; // the view stays as it was
     this.nose.set(1, 0, 0).applyQuaternion(uav.quaternion);
     const yaw = Math.atan2(this.nose.y, this.nose.x);
     this.heading ??= yaw;
     this.heading += easing(stepS, HEADING_S) * turnTo(this.heading, yaw);
     directionOf(this.heading + this.gaze.yaw, this.gaze.pitch, this.direction);
-    const distance = 7.5 * uav.reach * this.away;
+    const distance = 7.5 * uav.radius * this.away;
     eye.position.copy(uav.position).addScaledVector(this.direction, -distance);
     const ground = around.heightAt(eye.position.x, eye.position.y);
     eye.position.z = Math.max(eye.position.z, ground + 0.3);

@@ -17,7 +17,7 @@ export class Fly implements Rig {
   private readonly wanted = new Vector3();
   private readonly direction = new Vector3();
   private readonly gaze = new Gaze();
-  private pace = 1;
+  private speedFactor = 1;
 
   enter(eye: Eye, _around: Surroundings, kept: CameraPose | null): void {
     this.velocity.set(0, 0, 0);
@@ -32,9 +32,9 @@ export class Fly implements Rig {
 
   update(input: Input, around: Surroundings, stepS: number, eye: Eye): void {
     this.gaze.turn(input, TURN);
-    this.pace = clamp(0.1, this.pace / input.zoom, 20);
+    this.speedFactor = clamp(0.1, this.speedFactor / input.zoom, 20);
     const [forward, left, up] = pushed(input.held);
-    const speed = SPEED_M_S * this.pace * (isFast(input.held) ? FAST : 1);
+    const speed = SPEED_M_S * this.speedFactor * (isFast(input.held) ? FAST : 1);
     const [east, north] = this.gaze.level(0, left);
     this.gaze.direction(this.wanted).multiplyScalar(forward);
     this.wanted.x += east;
@@ -50,9 +50,9 @@ export class Fly implements Rig {
     eye.fov = FOV;
   }
 
-  /** Two fingers or the right button push the picture. */
+  /** Two fingers or the right button push the view. */
   private drag({ panX, panY }: Input): void {
-    const scale = 0.02 * this.pace;
+    const scale = 0.02 * this.speedFactor;
     const [east, north] = this.gaze.level(0, -panX);
     this.position.x += scale * east;
     this.position.y += scale * north;

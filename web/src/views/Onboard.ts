@@ -27,7 +27,7 @@ export class Onboard implements Rig {
       return;
     }
     if (uav === null) return;
-    this.nose.set(0.55 * uav.reach, 0, 0.12 * uav.reach).applyQuaternion(uav.quaternion);
+    this.nose.set(0.55 * uav.radius, 0, 0.12 * uav.radius).applyQuaternion(uav.quaternion);
     eye.position.copy(uav.position).add(this.nose);
     eye.quaternion.copy(uav.quaternion).multiply(CAMERA_IN_BODY);
     eye.fov = NOSE_FOV * this.zoom;

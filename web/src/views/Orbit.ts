@@ -20,7 +20,7 @@ export class Orbit implements Rig {
   private distance = 12;
   private shown = { yaw: 0.7, pitch: -0.35, distance: 12 };
   private follows = true;
-  private placed = false;
+  private isPlaced = false;
   private readonly step = new Vector3();
   /** From the UAV that is followed to what the camera looks at: the middle of its group, at first. */
   private readonly offset = new Vector3();
@@ -32,11 +32,11 @@ export class Orbit implements Rig {
       this.gaze.set(kept);
       this.distance = clamp(NEAREST_M, kept.distance, FARTHEST_M);
       this.follows = kept.follows;
-      this.placed = true;
+      this.isPlaced = true;
       this.settle();
       return;
     }
-    if (this.placed && around.uav !== null) {
+    if (this.isPlaced && around.uav !== null) {
       const { yaw } = headingOf(eye.quaternion);
       this.gaze.yaw = yaw;
     }
@@ -50,13 +50,13 @@ export class Orbit implements Rig {
       this.target.set(0, 0, around.heightAt(0, 0) + 1);
       return;
     }
-    this.placed = true;
+    this.isPlaced = true;
     const { uav, group, aspect } = around;
     this.followed = uav.name;
     this.target.fromArray(group.middle);
     this.offset.copy(this.target).sub(uav.position);
     this.gaze.pitch = -0.3;
-    this.distance = clamp(14 * uav.reach, fittingDistance(group.radius, FOV, aspect), 120);
+    this.distance = clamp(14 * uav.radius, fittingDistance(group.radius, FOV, aspect), 120);
     this.settle();
   }
 
@@ -70,11 +70,11 @@ export class Orbit implements Rig {
     if (around.uav === null) return;
     this.follows = true;
     this.offset.set(0, 0, 0);
-    this.distance = clamp(9 * around.uav.reach, this.distance, 16 * around.uav.reach);
+    this.distance = clamp(9 * around.uav.radius, this.distance, 16 * around.uav.radius);
   }
 
   update(input: Input, around: Surroundings, stepS: number, eye: Eye): void {
-    if (!this.placed && around.uav !== null) this.begin(around);
+    if (!this.isPlaced && around.uav !== null) this.begin(around);
     this.gaze.turn(input, -TURN);
     this.distance = clamp(NEAREST_M, this.distance * input.zoom, FARTHEST_M);
     if (input.panX !== 0 || input.panY !== 0) this.pan(input, eye);

@@ -68,7 +68,7 @@ const COLOURING_TITLES: Record<Colouring, string> = {
   height: "height",
 };
 
-/** The small menu of views and layers over the picture. */
+/** The small menu of views and layers over the scene. */
 export function ViewMenu() {
   const name = useView((view) => view.name);
   return (

@@ -25,7 +25,7 @@ export interface Clicks {
   leave: () => void;
 }
 
-/** Mouse, fingers, pen and wheel on the picture, and the keys that move a walker. */
+/** Mouse, fingers, pen and wheel on the scene, and the keys that move a walker. */
 export class Hands implements Input {
   turnX = 0;
   turnY = 0;
@@ -84,7 +84,7 @@ export class Hands implements Input {
   private readonly move = (event: PointerEvent): void => {
     const finger = this.fingers.get(event.pointerId);
     if (finger === undefined) {
-      const { x, y } = this.inPicture(event);
+      const { x, y } = this.onCanvas(event);
       this.clicks.hover(x, y);
       return;
     }
@@ -97,7 +97,7 @@ export class Hands implements Input {
     if (!this.start.moved) return;
     this.busy = true;
     if (this.fingers.size >= 2) {
-      // Each finger tells its own half of what both do.
+      // Each finger gives its own half of what both do.
       this.panX += dx / 2;
       this.panY += dy / 2;
       const spread = this.spread();
@@ -116,7 +116,7 @@ export class Hands implements Input {
     this.fingers.delete(event.pointerId);
     if (finger === undefined || this.start.moved || finger.button !== 0 || this.fingers.size > 0)
       return;
-    const { x, y } = this.inPicture(event);
+    const { x, y } = this.onCanvas(event);
     const double = event.timeStamp - this.clickedMs < DOUBLE_MS;
     this.clickedMs = double ? -Infinity : event.timeStamp;
     if (double) this.clicks.doubleClick(x, y);
@@ -151,16 +151,16 @@ export class Hands implements Input {
     return a === undefined || b === undefined ? 0 : Math.hypot(a.x - b.x, a.y - b.y);
   }
 
-  private inPicture(event: PointerEvent): { x: number; y: number } {
+  private onCanvas(event: PointerEvent): { x: number; y: number } {
     const { left, top } = this.element.getBoundingClientRect();
     return { x: event.clientX - left, y: event.clientY - top };
   }
 }
 
-/** Whether a key is meant for something else: a field, a shortcut, somebody who took it already. */
+/** Whether a key is meant for something else: a field, a shortcut, a listener that took it already. */
 export function isTyping(event: KeyboardEvent): boolean {
   if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return true;
-  // Somebody flies by hand: those keys are the UAV's.
+  // In manual control those keys are the UAV's.
   if (useFlying.getState().uav !== "" && isFlightKey(event.code)) return true;
   const target = event.target as HTMLElement | null;
   return (

@@ -3,7 +3,7 @@ import type { Frame } from "../lib/framing.ts";
 import type { CameraPose } from "../state/view.ts";
 import type { Input } from "./input.ts";
 
-/** From where and how a picture is taken. */
+/** From where and how the scene is seen. */
 export interface Eye {
   position: Vector3;
   quaternion: Quaternion;
@@ -14,7 +14,7 @@ export interface Eye {
 /** What a view may know of the world. */
 export interface Surroundings {
   heightAt: (x: number, y: number) => number;
-  /** Where a walker ends who wants from one place to another. */
+  /** Where a walker ends that moves from one position towards another. */
   walk: (from: readonly [number, number], to: readonly [number, number]) => [number, number];
   /** The selected UAV as it is shown; null: there is none. */
   uav: {
@@ -22,19 +22,19 @@ export interface Surroundings {
     position: Vector3;
     quaternion: Quaternion;
     /** From its middle to its farthest rotor, m. */
-    reach: number;
+    radius: number;
   } | null;
   /** Camera of the selected UAV; null: it has none. */
   uavCamera: Eye | null;
   /** What encloses the selected UAV and those near it, m. */
   group: Frame;
-  /** Width over height of the picture. */
+  /** Width over height of the view. */
   aspect: number;
 }
 
-/** One way of looking at the scene. */
+/** A kind of view of the scene. */
 export interface Rig {
-  /** Begin: where somebody was who looked from `eye`, or where a link says. */
+  /** Begin: at `eye`, where the view before was, or where a link says. */
   enter(eye: Eye, around: Surroundings, kept: CameraPose | null): void;
   /** Take what the hands did; `eye` becomes what is seen after another `stepS`. */
   update(input: Input, around: Surroundings, stepS: number, eye: Eye): void;

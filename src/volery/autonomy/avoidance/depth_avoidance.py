@@ -19,7 +19,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
 from volery.graph.messages import CameraInfo, Image
 
-_LEAST_HEIGHT_M = 0.5
+_MIN_HEIGHT_M = 0.5
 """Min height above the take-off position; lower points are ground and herbs."""
 _SLAB_M = 0.9
 """Height difference to the UAV within which points are obstacles."""
@@ -58,9 +58,9 @@ class DepthAvoidance(DepthCourse):
         """Stores the obstacles of an image at flight height."""
         points = self._projector.points(image, info, pose)
         height = points[:, 2]
-        in_the_way = np.abs(height - pose.position[2]) < _SLAB_M
-        above_ground = height > self.ground_height + _LEAST_HEIGHT_M
-        self._obstacles.add(points[in_the_way & above_ground], self.now_ns)
+        in_slab = np.abs(height - pose.position[2]) < _SLAB_M
+        above_ground = height > self.ground_height + _MIN_HEIGHT_M
+        self._obstacles.add(points[in_slab & above_ground], self.now_ns)
 
     def steer(self, pose: OdometrySample) -> tuple[Array, float]:
         """Steers through the best gap."""

@@ -16,12 +16,12 @@ from volery.core.arrays import Array
 from volery.graph.messages import String
 
 _PERIOD_S = 0.05
-_LEAST_CLIMB_M = 1.0
-_AT_PLACE_M = 0.6
+_MIN_CLIMB_M = 1.0
+_AT_LANDING_POSITION_M = 0.6
 """Distance from its landing position within which the UAV stops."""
 _CLEAR_M, _WANTED_CLEAR_M = 1.0, 1.2
 """Distance from growth at which the UAV lands, and with which a position is chosen."""
-_MOST_PLACES = 4
+_MAX_LANDING_POSITIONS = 4
 """Positions that the UAV tries before it lands where it is (modelling choice)."""
 
 
@@ -47,7 +47,7 @@ class GapFollowing(GapFlight):
     """
 
     STATE = (
-        *("_phase", "_home", "_next_waypoint", "_settle_at", "_stop", "_places"),
+        *("_phase", "_home", "_next_waypoint", "_settle_at", "_stop", "_num_landing_positions"),
         *GapFlight.STATE,
     )
 
@@ -60,7 +60,7 @@ class GapFollowing(GapFlight):
         self._next_waypoint = 0
         self._settle_at: Array | None = None
         self._stop = Stop()
-        self._places = 0
+        self._num_landing_positions = 0
         """Landing positions chosen so far."""
         self._status = self.create_publisher(String, "~/phase", 1)
         self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
@@ -91,7 +91,7 @@ class GapFollowing(GapFlight):
     def _climb(self, pose: OdometrySample) -> None:
         self._refit_ground(pose)
         climbed = float(pose.position[2] - self._home[2])
-        has_stopped = climbed > _LEAST_CLIMB_M and abs(pose.velocity[2]) < 0.1
+        has_stopped = climbed > _MIN_CLIMB_M and abs(pose.velocity[2]) < 0.1
         if has_stopped or climbed > self._height - 0.5:
             self._phase = GapFollowingPhase.FLY
 
@@ -104,7 +104,7 @@ class GapFollowing(GapFlight):
             self._steering.begin_leg(now)
             if self._next_waypoint == len(self._route):
                 self._phase = GapFollowingPhase.SETTLE
-                self._settle_at = self._landing_place(pose)
+                self._settle_at = self._landing_position(pose)
             return
         self._go_towards(pose, to_goal)
 
@@ -113,18 +113,21 @@ class GapFollowing(GapFlight):
         self._refit_ground(pose)
         assert self._settle_at is not None
         now = self.get_clock().now_ns()
-        to_place = self._settle_at - pose.position[:2]
-        distance = float(np.hypot(*to_place))
-        if distance < _AT_PLACE_M or self._steering.is_stuck(distance, now):
+        offset = self._settle_at - pose.position[:2]
+        distance = float(np.hypot(*offset))
+        if distance < _AT_LANDING_POSITION_M or self._steering.is_stuck(distance, now):
             self._stop.begin(now)
         if not self._stop.has_begun:
-            self._go_towards(pose, to_place)
+            self._go_towards(pose, offset)
             return
         self._publish(pose, np.zeros(2), 0.0)
         if not self._stop.is_over(pose, now):
             return
-        if self._clearance(pose, np.zeros(2)) < _CLEAR_M and self._places < _MOST_PLACES:
-            self._settle_at = self._landing_place(pose)
+        if (
+            self._clearance(pose, np.zeros(2)) < _CLEAR_M
+            and self._num_landing_positions < _MAX_LANDING_POSITIONS
+        ):
+            self._settle_at = self._landing_position(pose)
             self._steering.begin_leg(now)
             self._stop = Stop()
         elif self._land.call().success:
@@ -133,20 +136,20 @@ class GapFollowing(GapFlight):
     def _wait(self, pose: OdometrySample) -> None:
         """Does nothing: the flight mode lands the UAV."""
 
-    def _landing_place(self, pose: OdometrySample) -> Array:
+    def _landing_position(self, pose: OdometrySample) -> Array:
         """Returns the nearest position (2,) m within 8 m without growth within 1.2 m."""
-        self._places += 1
+        self._num_landing_positions += 1
         best, best_cost = np.zeros(2), math.inf
         for radius in np.arange(0.0, 8.1, 1.0):
             for angle in np.arange(0.0, 2.0 * math.pi, math.pi / 8.0):
-                place = radius * np.array([math.cos(angle), math.sin(angle)])
-                gap = self._clearance(pose, place)
+                offset = radius * np.array([math.cos(angle), math.sin(angle)])
+                gap = self._clearance(pose, offset)
                 cost = float(radius) + 20.0 * max(0.0, _WANTED_CLEAR_M - gap)
                 if cost < best_cost:
-                    best, best_cost = place, cost
+                    best, best_cost = offset, cost
         return np.asarray(pose.position[:2] + best)
 
-    def _clearance(self, pose: OdometrySample, place: Array) -> float:
+    def _clearance(self, pose: OdometrySample, offset: Array) -> float:
         """Returns the distance from growth, m, of a position (2,) m from the UAV."""
         growth = self._low_obstacles.around(pose.position[:2], self.get_clock().now_ns(), 10.0)
-        return float(np.hypot(*(growth - place).T).min()) if len(growth) else math.inf
+        return float(np.hypot(*(growth - offset).T).min()) if len(growth) else math.inf

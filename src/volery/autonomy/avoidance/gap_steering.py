@@ -15,7 +15,7 @@ from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
 
-REACH_M = 14.0
+MAX_RANGE_M = 14.0
 """Range of the obstacles that matter."""
 _STUCK_AFTER_S = 8.0
 _STUCK_PROGRESS_M = 2.0
@@ -64,8 +64,8 @@ class GapSteering:
         """
         distance = float(np.hypot(*to_goal))
         goal_angle = self._detoured(math.atan2(to_goal[1], to_goal[0]), distance, now)
-        obstacles = memory.around(pose.position[:2], now, REACH_M)
-        free = free_distances(obstacles, self._caution.safe_radius_m, REACH_M)
+        obstacles = memory.around(pose.position[:2], now, MAX_RANGE_M)
+        free = free_distances(obstacles, self._caution.safe_radius_m, MAX_RANGE_M)
         heading = choose_heading(free, goal_angle, distance, self._last_heading)
         if heading is None:
             self._last_heading = None

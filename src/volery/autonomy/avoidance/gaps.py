@@ -25,13 +25,13 @@ _LOYALTY = 0.35
 _OPENNESS = 0.25
 
 
-def free_distances(obstacles: Array, safe_radius: float, reach: float) -> Array:
-    """Returns how far a disc of `safe_radius` can move along `SECTOR_ANGLES`, at most `reach`.
+def free_distances(obstacles: Array, safe_radius: float, max_range: float) -> Array:
+    """Returns how far a disc of `safe_radius` can move along `SECTOR_ANGLES`, at most `max_range`.
 
     `obstacles` is (K, 2), relative to the disc, m. An obstacle nearer than the safe radius blocks
     only the half plane towards it, so that the UAV can move away.
     """
-    free = np.full(SECTORS, reach)
+    free = np.full(SECTORS, max_range)
     _shorten(np.ascontiguousarray(obstacles, dtype=np.float64), safe_radius, free)
     return free
 

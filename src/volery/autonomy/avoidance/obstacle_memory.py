@@ -28,7 +28,7 @@ class ObstacleMemory:
         looks_needed: int = 1,
     ) -> None:
         self._cell = cell_m
-        self._reach = half_width_m
+        self._half_width_m = half_width_m
         self._keep_ns = round(keep_s * 1e9)
         self._looks_needed = looks_needed
         size = int(2 * half_width_m / cell_m)
@@ -46,7 +46,7 @@ class ObstacleMemory:
         count = _gather(
             center[0],
             center[1],
-            min(radius_m, self._reach),
+            min(radius_m, self._half_width_m),
             time_ns - self._keep_ns,
             self._cell,
             self._looks_needed,

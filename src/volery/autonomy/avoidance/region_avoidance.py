@@ -71,7 +71,7 @@ class RegionAvoidance(DepthCourse):
             self.declare_parameter("threshold", 0.6, min_value=0.0, max_value=1.0).value
         )
         self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
-        if not all(0.0 < share <= 1.0 for share in self._region):
+        if not all(0.0 < fraction <= 1.0 for fraction in self._region):
             raise NodeError(
                 f"region must be [width, height], each above 0 and at most 1, not {self._region}"
             )

@@ -1,4 +1,4 @@
-"""The stop before a landing: a UAV that is told to land in flight comes down elsewhere."""
+"""The stop before a landing: a UAV commanded to land in flight comes down elsewhere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 
 _STILL_M_S = 0.3
 """Speed over ground below which a UAV has stopped (modelling choice)."""
-_PATIENCE_NS = 5_000_000_000
+_TIMEOUT_NS = 5_000_000_000
 """Time after which it has stopped as well as it can, in gusts (modelling choice)."""
 
 
@@ -36,4 +36,4 @@ class Stop:
         if self.since_ns is None:
             return False
         is_still = float(np.hypot(*pose.velocity[:2])) < _STILL_M_S
-        return is_still or now_ns - self.since_ns > _PATIENCE_NS
+        return is_still or now_ns - self.since_ns > _TIMEOUT_NS

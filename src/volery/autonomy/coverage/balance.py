@@ -12,19 +12,19 @@ from volery.core.compiled import inner_kernel, kernel, owning_kernel
 
 _WALK_LOOKS = 4
 """Checks that a step of a walk through an area counts as, because of its random memory access."""
-_MOST_TRIES_A_PAIR = 40
+_MAX_TRIES_PER_PAIR = 40
 """Chains of exchanges tried for each pair of UAVs. Modelling choice: most maps need a handful."""
 
 
 @kernel
 def balance(
-    neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints, most_looks: int
+    neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints, max_looks: int
 ) -> None:
     """Moves cells from areas that are too large to those that are too small, area by area.
 
     `owner` must hold connected areas; they stay connected. Cells move along the shortest chain of
     adjacent areas. At a border, cells that are nearest to their new start relative to their old one
-    move first. It stops after `most_looks` checks of cells.
+    move first. It stops after `max_looks` checks of cells.
     """
     count, robots = owner.shape[0], starts.shape[0]
     surplus = np.empty(robots, np.int64)
@@ -38,8 +38,8 @@ def balance(
     buffers = np.empty((2, count), np.int32)
     gaps = np.empty(count, np.float32)
     seen = np.zeros(count, np.bool_)
-    looks = np.full(1, most_looks)
-    for _ in range(_MOST_TRIES_A_PAIR * robots * robots):
+    looks = np.full(1, max_looks)
+    for _ in range(_MAX_TRIES_PER_PAIR * robots * robots):
         if (surplus == 0).all() or looks[0] < 0:
             return
         looks[0] -= count
@@ -211,14 +211,14 @@ def _hand_over_held(
     It is the first that moves at most `amount` cells, else the one that moves fewest, below twice
     that.
     """
-    least, chosen = 2 * amount, -1
+    smallest, chosen = 2 * amount, -1
     for k in border:
         if looks[0] < 0:
             break
         size = _held_by(neighbours, start, owner, k, queue, seen)
         looks[0] -= _WALK_LOOKS * owner.shape[0]
-        if size < least:
-            least, chosen = size, k
+        if size < smallest:
+            smallest, chosen = size, k
         if size <= amount:
             break
     if chosen < 0:
@@ -228,7 +228,7 @@ def _hand_over_held(
     for k in range(owner.shape[0]):
         if owner[k] == giver and (k == chosen or not seen[k]):
             owner[k] = taker
-    return least
+    return smallest
 
 
 @inner_kernel

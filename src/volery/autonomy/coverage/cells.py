@@ -22,9 +22,9 @@ Mask = NDArray[np.bool_]
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 """Columns of `CoverageCells.neighbours`; NE, NW, SW and SE follow."""
 
-MOST_MAP_CELLS = 4096 * 4096
+MAX_MAP_CELLS = 4096 * 4096
 """Max map size, free and blocked cells together: its index takes 64 MiB. Modelling choice."""
-MOST_CELLS = 1 << 18
+MAX_CELLS = 1 << 18
 """Max number of cells to visit, as of 512 x 512 free ones: a plan takes seconds. Modelling
 choice.
 """
@@ -57,15 +57,15 @@ class CoverageCells:
         """Returns the cells of `mask` (rows, columns). Raises PlanError if there are too many."""
         if mask.ndim != 2 or 0 in mask.shape:
             raise PlanError(f"a map must have rows and columns, not the shape {mask.shape}")
-        if mask.size > MOST_MAP_CELLS:
+        if mask.size > MAX_MAP_CELLS:
             raise PlanError(
                 f"the map has {mask.shape[1]} x {mask.shape[0]} cells; at most "
-                f"{MOST_MAP_CELLS:,} (4096 x 4096) can be planned: increase the cell size"
+                f"{MAX_MAP_CELLS:,} (4096 x 4096) can be planned: increase the cell size"
             )
         count = int(np.count_nonzero(mask))
-        if count > MOST_CELLS:
+        if count > MAX_CELLS:
             raise PlanError(
-                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: "
+                f"the map has {count:,} free cells; at most {MAX_CELLS:,} can be planned: "
                 "increase the cell size"
             )
         flat = np.flatnonzero(mask).astype(np.int32)
@@ -83,14 +83,14 @@ class CoverageCells:
 
     def part(self, numbers: Ints) -> CoverageCells:
         """Returns these cells alone, numbered in this order; `numbers` must ascend."""
-        place = np.full(len(self) + 1, -1, np.int32)  # the last one maps "none", -1, to itself
-        place[numbers] = np.arange(len(numbers), dtype=np.int32)
+        new_number = np.full(len(self) + 1, -1, np.int32)  # the last one maps "none", -1, to itself
+        new_number[numbers] = np.arange(len(numbers), dtype=np.int32)
         flat = self.flat[numbers]
         index = np.full(len(self.index), -1, np.int32)
-        index[flat] = place[numbers]
-        return CoverageCells(self.shape, flat, index, place[self.neighbours[numbers]])
+        index[flat] = new_number[numbers]
+        return CoverageCells(self.shape, flat, index, new_number[self.neighbours[numbers]])
 
-    def places(self) -> NDArray[np.int64]:
+    def rows_and_columns(self) -> NDArray[np.int64]:
         """Returns row and column (n, 2)."""
         return np.stack(np.divmod(self.flat.astype(np.int64), self.shape[1]), axis=1)
 
@@ -108,17 +108,17 @@ class CoverageCells:
         _spread(self.neighbours, np.asarray(sources, np.int32), out)
         return out
 
-    def way(self, start: int, goal: int) -> list[int]:
+    def path(self, start: int, goal: int) -> list[int]:
         """Returns the cells of a shortest path, both ends included; empty if there is none."""
         distance = self.distances([goal])
         if distance[start] == FAR:
             return []
-        way = [start]
-        while way[-1] != goal:
-            around = self.neighbours[way[-1]]
+        path = [start]
+        while path[-1] != goal:
+            around = self.neighbours[path[-1]]
             around = around[around >= 0]
-            way.append(int(around[np.argmin(distance[around])]))
-        return way
+            path.append(int(around[np.argmin(distance[around])]))
+        return path
 
 
 @kernel

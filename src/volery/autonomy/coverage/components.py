@@ -40,33 +40,33 @@ class AreaShares:
 class ReachableCells:
     """Distances of UAVs to the cells to visit.
 
-    ways: the cells through which they fly, which include those to visit. flies_over: whether they
-    may also cross blocked cells in a straight line.
+    passable: the cells through which they fly, which include those to visit. flies_over: whether
+    they may also cross blocked cells in a straight line.
     """
 
-    ways: CoverageCells
+    passable: CoverageCells
     to_visit: CoverageCells
     flies_over: bool
 
     def of(self, start: int) -> NDArray[np.float32]:
-        """Returns distances (n,) from cell `start` of the ways, in cells; `FAR` for no path."""
-        along = self.ways.distances([start])[self.ways.index[self.to_visit.flat]]
+        """Returns distances (n,) from cell `start` of `passable`, in cells; `FAR` for no path."""
+        along = self.passable.distances([start])[self.passable.index[self.to_visit.flat]]
         if self.flies_over:
             rows, columns = np.divmod(self.to_visit.flat, self.to_visit.shape[1])
-            row, column = divmod(int(self.ways.flat[start]), self.ways.shape[1])
+            row, column = divmod(int(self.passable.flat[start]), self.passable.shape[1])
             straight = np.hypot(rows - row, columns - column).astype(np.float32)
             along = np.where(along == FAR, straight, along)
         return along
 
 
-def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -> AreaShares:
+def share_parts(reachable: ReachableCells, starts: Ints, labels: Ints, parts: int) -> AreaShares:
     """Assigns an entry cell to every UAV and a UAV to every part.
 
-    starts: (R,) cells of `reach.ways`. labels: (n,) part of each cell to visit. A UAV in a cell to
-    visit begins there, any other in the nearest cell where no UAV begins.
+    starts: (R,) cells of `reachable.passable`. labels: (n,) part of each cell to visit. A UAV in a
+    cell to visit begins there, any other in the nearest cell where no UAV begins.
     """
-    count = len(reach.to_visit)
-    entries = reach.to_visit.index[reach.ways.flat[starts]].copy()
+    count = len(reachable.to_visit)
+    entries = reachable.to_visit.index[reachable.passable.flat[starts]].copy()
     taken = np.zeros(count, np.bool_)
     taken[entries[entries >= 0]] = True
     nearest = np.full(parts, FAR, np.float32)
@@ -74,18 +74,18 @@ def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -
     by_part = np.argsort(labels, kind="stable")
     firsts = np.searchsorted(labels[by_part], np.arange(parts))
     for uav, start in enumerate(starts):
-        away = reach.of(int(start))
+        away = reachable.of(int(start))
         if entries[uav] < 0:
             free = np.where(taken, FAR, away)
             best = int(np.argmin(free)) if count else -1
             if best >= 0 and free[best] < FAR:
                 entries[uav] = best
                 taken[best] = True
-        least = np.minimum.reduceat(away[by_part], firsts) if parts else nearest
-        closer = least < nearest
+        smallest = np.minimum.reduceat(away[by_part], firsts) if parts else nearest
+        closer = smallest < nearest
         if closer.any():
-            nearest[closer], uav_of[closer] = least[closer], uav
-            entry_of[closer] = _entries(away, labels, least, closer)
+            nearest[closer], uav_of[closer] = smallest[closer], uav
+            entry_of[closer] = _entries(away, labels, smallest, closer)
     lived_in = np.unique(labels[entries[entries >= 0]])
     empty = np.setdiff1d(np.arange(parts, dtype=np.int32), lived_in)
     reached = empty[uav_of[empty] >= 0]
@@ -95,10 +95,10 @@ def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -
 
 
 def _entries(
-    away: NDArray[np.float32], labels: Ints, least: NDArray[np.float32], wanted: Mask
+    away: NDArray[np.float32], labels: Ints, smallest: NDArray[np.float32], wanted: Mask
 ) -> Ints:
     """Returns the first cell of each wanted part at the part's min distance."""
-    at_least = np.flatnonzero((away == least[labels]) & wanted[labels]).astype(np.int32)
+    at_least = np.flatnonzero((away == smallest[labels]) & wanted[labels]).astype(np.int32)
     _, first = np.unique(labels[at_least], return_index=True)
     found: Ints = at_least[first]
     return found

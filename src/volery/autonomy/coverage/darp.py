@@ -25,16 +25,16 @@ from volery.autonomy.coverage.joining import join_parts, walk_part
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import stream_key, uniform
 
-MOST_ITERATIONS = 600
-MOST_UPDATES = 300_000_000
+MAX_ITERATIONS = 600
+MAX_UPDATES = 300_000_000
 """Max cell updates of one division, some seconds on one core. Modelling choice."""
 _NEAR_ENOUGH = 0.02
 """Fraction of the cells that `balance` may still have to move. Modelling choice."""
-_LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
+_LOOKS_A_CELL, _MAX_LOOKS = 3_000, 200_000_000
 """Limits of `balance`, a few seconds at most. Modelling choice."""
 _GAIN = 0.25
 """Initial gain of the correction factors on the relative error of a share. Modelling choice."""
-_LEAST_GAIN = 0.01
+_MIN_GAIN = 0.01
 """Min gain; it is halved whenever a UAV changes from too many cells to too few."""
 _VARIATION = 0.01
 """Max deviation of one iteration's connectivity factor from 1: the article's."""
@@ -57,11 +57,11 @@ def divide(
     owner = np.zeros(len(cells), np.int32)
     if len(starts) == 1:
         return owner
-    iterations = min(MOST_ITERATIONS, max(10, MOST_UPDATES // fields.size))
+    iterations = min(MAX_ITERATIONS, max(10, MAX_UPDATES // fields.size))
     key = stream_key(seed, "coverage/darp")
     _iterate(cells.neighbours, starts, targets, fields, key, iterations, owner)
     join_parts(cells.neighbours, starts, targets, owner)
-    looks = min(_LOOKS_A_CELL * len(cells), _MOST_LOOKS)
+    looks = min(_LOOKS_A_CELL * len(cells), _MAX_LOOKS)
     balance(cells.neighbours, starts, targets, distances, owner, looks)
     if _missing(owner, targets):
         grown = grow(cells, starts, targets, distances)
@@ -114,7 +114,7 @@ def _iterate(
         for r in range(robots):
             error = (sizes[r] - targets[r]) / targets[r]
             if error * sides[r] < 0.0:
-                gain[r] = max(0.5 * gain[r], _LEAST_GAIN)
+                gain[r] = max(0.5 * gain[r], _MIN_GAIN)
             sides[r] = error
             factor = min(max(1.0 + gain[r] * error, 0.5), 2.0)
             if lost[r]:
@@ -138,11 +138,11 @@ def _assign(fields: Any, starts: Ints, here: Ints, sizes: Any) -> None:
     """Assigns each cell to the UAV with the smallest field, each start to its own."""
     robots, count = fields.shape
     for k in range(count):
-        least = 0
+        nearest = 0
         for r in range(1, robots):
-            if fields[r, k] < fields[least, k]:
-                least = r
-        here[k] = least
+            if fields[r, k] < fields[nearest, k]:
+                nearest = r
+        here[k] = nearest
     for r in range(robots):
         here[starts[r]] = r
     sizes[:] = 0

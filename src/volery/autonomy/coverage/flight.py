@@ -88,20 +88,22 @@ class CoverageFlight:
         return (
             self.phase is CoveragePhase.COVER
             and self.waypoints is not None
-            and bool(self.waypoints.covering[min(self.following, len(self.waypoints.places) - 1)])
+            and bool(
+                self.waypoints.covering[min(self.following, len(self.waypoints.positions) - 1)]
+            )
         )
 
     def goal(self, acceptance_radius_m: float, now_ns: int) -> Array | None:
         """Returns the current waypoint (3,) m, advancing past reached ones; None at the end."""
         assert self.position_map is not None
         assert self.waypoints is not None
-        while self.following < len(self.waypoints.places):
-            place: Array = self.waypoints.places[self.following]
-            away = norm(place - self.position_map)
+        while self.following < len(self.waypoints.positions):
+            goal: Array = self.waypoints.positions[self.following]
+            away = norm(goal - self.position_map)
             if away > acceptance_radius_m:
                 if away < self.nearest_m - _PROGRESS_M:
                     self.nearest_m, self.since_ns = away, now_ns
-                return place
+                return goal
             self.following += 1
             self._begin_leg(now_ns)
         return None

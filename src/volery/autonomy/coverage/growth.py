@@ -14,7 +14,7 @@ from volery.autonomy.coverage.balance import balance
 from volery.autonomy.coverage.cells import CoverageCells, Ints
 from volery.autonomy.coverage.joining import join_parts
 
-_LOOKS_A_CELL, _MOST_LOOKS = 10_000, 600_000_000
+_LOOKS_A_CELL, _MAX_LOOKS = 10_000, 600_000_000
 """Limits of `balance`, some seconds at most for each doubling. Modelling choice."""
 
 
@@ -38,7 +38,7 @@ def grow(
         present = _present_targets(part, begin, targets)
         area = owner[members]
         join_parts(part.neighbours, begin, present, area)
-        looks = min(_LOOKS_A_CELL * size, _MOST_LOOKS)
+        looks = min(_LOOKS_A_CELL * size, _MAX_LOOKS)
         balance(part.neighbours, begin, present, distances[:, members], area, looks)
         owner[members] = area
     return owner
@@ -54,8 +54,8 @@ def _present_targets(
     wanted = np.bincount(home, weights=targets, minlength=pieces)
     present = np.maximum((targets * sizes[home] / wanted[home]).astype(np.int64), 1)
     for piece in np.unique(home):
-        crew = np.flatnonzero(home == piece)
-        while (missing := int(sizes[piece] - present[crew].sum())) != 0:
-            fair = crew if missing > 0 else crew[present[crew] > 1]
+        uavs = np.flatnonzero(home == piece)
+        while (missing := int(sizes[piece] - present[uavs].sum())) != 0:
+            fair = uavs if missing > 0 else uavs[present[uavs] > 1]
             present[fair[: abs(missing)]] += np.sign(missing)
     return present

@@ -49,23 +49,23 @@ def path_message(waypoints: WaypointProgress, now_ns: int) -> PathMessage:
     """Returns the path of one UAV's waypoints."""
     stamp = header(now_ns, "map")
     return PathMessage(
-        stamp, [PoseStamped(stamp, Pose(Point(*p), _LEVEL)) for p in waypoints.places]
+        stamp, [PoseStamped(stamp, Pose(Point(*p), _LEVEL)) for p in waypoints.positions]
     )
 
 
-def goal_message(place: NDArray[np.float64], now_ns: int) -> PoseStamped:
+def goal_message(position: NDArray[np.float64], now_ns: int) -> PoseStamped:
     """Returns a goal in the map that leaves the heading unchanged."""
-    return PoseStamped(header(now_ns, "map"), Pose(Point(*place.tolist()), KEEP_HEADING))
+    return PoseStamped(header(now_ns, "map"), Pose(Point(*position.tolist()), KEEP_HEADING))
 
 
 def status_message(
-    flights: Sequence[CoverageFlight], plan: CoveragePlan | None, share: float, refused: str
+    flights: Sequence[CoverageFlight], plan: CoveragePlan | None, fraction: float, refused: str
 ) -> String:
     """Returns JSON: state, covered fraction, phase and cells of each UAV, reason of a refusal."""
     shares = [] if plan is None else plan.shares.tolist()
     status = {
         "state": "refused" if refused else "waiting" if plan is None else "flying",
-        "covered": round(share, 4),
+        "covered": round(fraction, 4),
         "phases": {flight.name: str(flight.phase) for flight in flights},
         "cells": shares,
         "spread": 0 if plan is None else plan.spread,
@@ -80,6 +80,6 @@ def _grid(field: CoverageField, values: NDArray[np.generic], now_ns: int) -> Occ
     data.flags.writeable = False
     rows, columns = field.free.shape
     turn = Quaternion(*rotations.from_rpy(0.0, 0.0, field.yaw).tolist())
-    place = Pose(Point(*field.origin_map, 0.0), turn)
-    info = MapMetaData(time_from_ns(now_ns), single(field.cell_m), columns, rows, place)
+    origin = Pose(Point(*field.origin_map, 0.0), turn)
+    info = MapMetaData(time_from_ns(now_ns), single(field.cell_m), columns, rows, origin)
     return OccupancyGrid(header(now_ns, "map"), info, data)

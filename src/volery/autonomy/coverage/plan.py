@@ -33,7 +33,7 @@ NOT_TO_VISIT = -2
 UNREACHABLE = -1
 """Owner of cells to visit that no UAV can reach."""
 
-MOST_FIELD_NUMBERS = 1 << 24
+MAX_FIELD_NUMBERS = 1 << 24
 """Max cells times UAVs in one part: 128 MiB for their fields. Modelling choice."""
 
 
@@ -82,11 +82,13 @@ def plan_coverage(
         A start is blocked, outside or not unique; no cell is free; map or fleet are too large.
 
     """
-    ways = CoverageCells.of(np.asarray(free, np.bool_))
-    begin = _checked_starts(ways, np.asarray(starts))
-    cells = ways if to_visit is None else CoverageCells.of(np.asarray(to_visit, np.bool_) & free)
+    passable = CoverageCells.of(np.asarray(free, np.bool_))
+    begin = _checked_starts(passable, np.asarray(starts))
+    cells = (
+        passable if to_visit is None else CoverageCells.of(np.asarray(to_visit, np.bool_) & free)
+    )
     labels, parts = cells.components()
-    shares = share_parts(ReachableCells(ways, cells, flies_over), begin, labels, parts)
+    shares = share_parts(ReachableCells(passable, cells, flies_over), begin, labels, parts)
     areas = np.full(len(cells), UNREACHABLE, np.int32)
     spread = _divide_parts(cells, labels, shares, areas, seed)
     routes = _routes(cells, labels, shares, areas)
@@ -95,18 +97,18 @@ def plan_coverage(
     return CoveragePlan(owner.reshape(cells.shape), routes, spread)
 
 
-def _checked_starts(ways: CoverageCells, starts: NDArray[np.int64]) -> Ints:
+def _checked_starts(passable: CoverageCells, starts: NDArray[np.int64]) -> Ints:
     """Returns the numbers of the start cells."""
     if starts.ndim != 2 or starts.shape[1] != 2 or not len(starts):
         raise PlanError("starts must be an array (R, 2) of rows and columns for at least one UAV")
-    if not len(ways):
+    if not len(passable):
         raise PlanError("the map has no free cell")
     numbers = np.empty(len(starts), np.int32)
     seen: dict[int, int] = {}
     for uav, (row, column) in enumerate(starts.tolist()):
-        number = ways.number(row, column)
+        number = passable.number(row, column)
         if number < 0:
-            inside = 0 <= row < ways.shape[0] and 0 <= column < ways.shape[1]
+            inside = 0 <= row < passable.shape[0] and 0 <= column < passable.shape[1]
             why = "is blocked" if inside else "lies outside the map"
             raise PlanError(f"UAV {uav + 1} starts in row {row}, column {column}, which {why}")
         if number in seen:
@@ -134,19 +136,19 @@ def _divide_parts(
     homes = labels[shares.entries[working]]
     spread = 0
     for part in np.unique(homes):
-        crew = working[homes == part]
-        if len(crew) * int(sizes[part]) > MOST_FIELD_NUMBERS:
+        uavs = working[homes == part]
+        if len(uavs) * int(sizes[part]) > MAX_FIELD_NUMBERS:
             raise PlanError(
-                f"{counted(len(crew), 'UAV')} for {sizes[part]:,} cells; their product may be "
-                f"{MOST_FIELD_NUMBERS:,} at most: use fewer UAVs or larger cells"
+                f"{counted(len(uavs), 'UAV')} for {sizes[part]:,} cells; their product may be "
+                f"{MAX_FIELD_NUMBERS:,} at most: use fewer UAVs or larger cells"
             )
         members = np.flatnonzero(labels == part).astype(np.int32)
         own = cells.part(members)
-        begin = own.index[cells.flat[shares.entries[crew]]]
-        targets = level_shares(len(own), carried[crew])
+        begin = own.index[cells.flat[shares.entries[uavs]]]
+        targets = level_shares(len(own), carried[uavs])
         owner = divide(own, begin, targets, seed=seed)
-        areas[members] = crew[owner]
-        load = np.bincount(owner, minlength=len(crew)) + carried[crew]
+        areas[members] = uavs[owner]
+        load = np.bincount(owner, minlength=len(uavs)) + carried[uavs]
         spread = max(spread, int(np.ptp(load)))
     return spread
 

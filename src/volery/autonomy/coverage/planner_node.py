@@ -111,11 +111,11 @@ class CoveragePlanner(SavedAttributes, Node):
             q = np.array([turn.x, turn.y, turn.z, turn.w])
             velocity = rotations.rotate(q, [twist.x, twist.y, twist.z])
             climb, speed = float(velocity[2]), float(np.hypot(*velocity[:2]))
-            place = np.array([pose.position.x, pose.position.y, pose.position.z])
+            position = np.array([pose.position.x, pose.position.y, pose.position.z])
             flight = self._flights[number]
-            flight.moved(place, climb, self.get_clock().now_ns(), speed)
+            flight.moved(position, climb, self.get_clock().now_ns(), speed)
             if flight.covers:
-                self._mark(place)
+                self._mark(position)
 
         return on_odometry
 
@@ -134,9 +134,9 @@ class CoveragePlanner(SavedAttributes, Node):
         if self._plan is not None:
             self._plan_again()
 
-    def _mark(self, place: NDArray[np.float64]) -> None:
+    def _mark(self, position: NDArray[np.float64]) -> None:
         assert self._field is not None
-        row, column = self._field.sub_cells_at(place).tolist()
+        row, column = self._field.sub_cells_at(position).tolist()
         rows, columns = self._covered.shape
         if 0 <= row < rows and 0 <= column < columns and self._field.free[row // 2, column // 2]:
             self._covered[row, column] = True
@@ -159,8 +159,8 @@ class CoveragePlanner(SavedAttributes, Node):
         rows, columns = self._field.free.shape
         whole = self._covered.reshape(rows, 2, columns, 2).all(axis=(1, 3))
         left = self._field.free & ~whole
-        places = self._field.cells_at(np.array([f.position_map for f in able]))
-        self._take_plan(able, self._field.apart(places), left)
+        start_cells = self._field.cells_at(np.array([f.position_map for f in able]))
+        self._take_plan(able, self._field.apart(start_cells), left)
 
     def _take_plan(self, able: list[CoverageFlight], starts: NDArray[np.int64], left: Mask) -> None:
         assert self._field is not None
@@ -175,7 +175,7 @@ class CoveragePlanner(SavedAttributes, Node):
         # the last two map the owners -2 and -1, which are no UAVs
         owner = np.array([*numbers, NOT_TO_VISIT, UNREACHABLE], np.int16)[plan.owner]
         self._plan, self._refused = plan, ""
-        ways = CoverageCells.of(free)
+        passable = CoverageCells.of(free)
         for number, flight, tours in zip(numbers, able, plan.routes, strict=True):
             assert flight.position_map is not None
             assert flight.home_map is not None
@@ -184,7 +184,7 @@ class CoveragePlanner(SavedAttributes, Node):
             flight.send(
                 route_waypoints(
                     self._field,
-                    ways,
+                    passable,
                     self._heights,
                     number,
                     flight.position_map,
@@ -268,7 +268,7 @@ class CoveragePlanner(SavedAttributes, Node):
     # ---------------------------------------------------------------------------------- publishers
 
     @property
-    def _share(self) -> float:
+    def _covered_fraction(self) -> float:
         """Covered fraction of the free cells' quarters."""
         assert self._field is not None
         free = 4 * int(np.count_nonzero(self._field.free))
@@ -277,7 +277,7 @@ class CoveragePlanner(SavedAttributes, Node):
 
     def _publish_progress(self) -> None:
         assert self._field is not None
-        self._progress.publish(Float32(float(np.float32(self._share))))
+        self._progress.publish(Float32(float(np.float32(self._covered_fraction))))
         count = int(np.count_nonzero(self._covered))
         if count != self._published_covered:
             self._published_covered = count
@@ -286,7 +286,7 @@ class CoveragePlanner(SavedAttributes, Node):
             self._publish_status()
 
     def _publish_status(self) -> None:
-        share = 0.0 if self._field is None else self._share
+        fraction = 0.0 if self._field is None else self._covered_fraction
         self._status.publish(
-            messages.status_message(self._flights, self._plan, share, self._refused)
+            messages.status_message(self._flights, self._plan, fraction, self._refused)
         )

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from volery.autonomy.coverage.cells import EAST, NORTH, SOUTH, WEST, CoverageCells, Ints
 from volery.core.compiled import inner_kernel, kernel
 
-ORDERS = 4
+NUM_ORDERS = 4
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class CoverageTour:
 
     def corners(self) -> Ints:
         """Returns the sub-cells (K, 2) where it turns, after its first one: the goals of a UAV."""
-        way = self.sub_cells
-        ahead = np.roll(way, -1, axis=0) - way
-        behind = way - np.roll(way, 1, axis=0)
+        path = self.sub_cells
+        ahead = np.roll(path, -1, axis=0) - path
+        behind = path - np.roll(path, 1, axis=0)
         turns = (ahead != behind).any(axis=1)
         turns[0] = True
-        corners: Ints = way[turns]
+        corners: Ints = path[turns]
         return corners
 
 
@@ -56,16 +56,16 @@ def tours(cells: CoverageCells, owner: Ints, starts: Ints) -> list[CoverageTour]
     each.
     """
     best: list[CoverageTour] = []
-    trees = np.empty((ORDERS, len(cells)), np.uint8)
-    for order in range(ORDERS):
+    trees = np.empty((NUM_ORDERS, len(cells)), np.uint8)
+    for order in range(NUM_ORDERS):
         _span(cells.neighbours, owner, order, trees[order])
     sizes = np.bincount(owner + 1, minlength=len(starts) + 1)[1:]
     for r, start in enumerate(starts):
         found = []
-        for order in range(ORDERS):
-            way = np.empty((4 * sizes[r], 2), np.int32)
-            turns = _walk_around(cells.flat, cells.index, trees[order], cells.shape[1], start, way)
-            found.append(CoverageTour(way, int(turns)))
+        for order in range(NUM_ORDERS):
+            path = np.empty((4 * sizes[r], 2), np.int32)
+            turns = _walk_around(cells.flat, cells.index, trees[order], cells.shape[1], start, path)
+            found.append(CoverageTour(path, int(turns)))
         best.append(min(found, key=lambda tour: tour.turns))
     return best
 
@@ -102,13 +102,13 @@ def _root_of(root: Ints, k: int) -> int:
 
 @kernel
 def _walk_around(
-    flat: Ints, index: Ints, tree: NDArray[np.uint8], columns: int, start: int, way: Ints
+    flat: Ints, index: Ints, tree: NDArray[np.uint8], columns: int, start: int, path: Ints
 ) -> int:
-    """Fills `way` with the tour from the south-west sub-cell of `start`; returns its turns."""
+    """Fills `path` with the tour from the south-west sub-cell of `start`; returns its turns."""
     row, column = 2 * (flat[start] // columns), 2 * (flat[start] % columns)
     heading, turns, first = -1, 0, -1
-    for i in range(way.shape[0]):
-        way[i, 0], way[i, 1] = row, column
+    for i in range(path.shape[0]):
+        path[i, 0], path[i, 1] = row, column
         k = index[(row // 2) * columns + column // 2]
         side = _side_ahead(row % 2, column % 2, tree[k])
         if heading < 0:

@@ -32,9 +32,9 @@ class HeightProfile:
     def __post_init__(self) -> None:
         """Raises PlanError for heights out of range."""
         low = {"height_m": (self.cover, -_HIGHEST), "layer_spacing_m": (self.layer, 0.0)}
-        for key, (height, least) in {**low, "crossing_height_m": (self.over, 0.0)}.items():
-            if not least <= height <= _HIGHEST:
-                raise PlanError(f"{key} must be {least:g} to {_HIGHEST:g} m, not {height:g}")
+        for key, (height, minimum) in {**low, "crossing_height_m": (self.over, 0.0)}.items():
+            if not minimum <= height <= _HIGHEST:
+                raise PlanError(f"{key} must be {minimum:g} to {_HIGHEST:g} m, not {height:g}")
 
     def transit(self, uav: int, *, over: bool) -> float:
         """Returns the transit height of UAV number `uav`, over blocked cells or not."""
@@ -45,13 +45,13 @@ class HeightProfile:
 class WaypointProgress:
     """Waypoints (K, 3) m, map, and whether the leg to each covers cells, (K,)."""
 
-    places: Array
+    positions: Array
     covering: NDArray[np.bool_]
 
 
 def route_waypoints(
     field: CoverageField,
-    ways: CoverageCells,
+    passable: CoverageCells,
     heights: HeightProfile,
     uav: int,
     position_map: Array,
@@ -60,34 +60,34 @@ def route_waypoints(
 ) -> WaypointProgress:
     """Returns the waypoints of one UAV: for each tour the transit and the tour, then the return.
 
-    ways: the free cells of the field. position_map: (3,) m, current position. home_map: (3,) m,
+    passable: the free cells of the field. position_map: (3,) m, current position. home_map: (3,) m,
     landing position.
     """
-    places: list[Array] = []
+    positions: list[Array] = []
     covering: list[bool] = []
     at = position_map[:2]
 
     def add(points: Array, height: float, covers: bool) -> None:
-        places.append(np.column_stack([points, np.full(len(points), height)]))
+        positions.append(np.column_stack([points, np.full(len(points), height)]))
         covering.extend([covers] * len(points))
 
     for each in tours:
         away = field.sub_centres(each.sub_cells) - at
         tour = each.begun_at(int(np.argmin(np.hypot(away[:, 0], away[:, 1]))))
         corners = field.sub_centres(np.vstack([tour.corners(), tour.sub_cells[-1:]]))
-        for points, height in _transit(field, ways, heights, uav, at, corners[0]):
+        for points, height in _transit(field, passable, heights, uav, at, corners[0]):
             add(points, height, False)
         add(corners, heights.cover, True)
         at = corners[-1]
-    for points, height in _transit(field, ways, heights, uav, at, home_map[:2]):
+    for points, height in _transit(field, passable, heights, uav, at, home_map[:2]):
         add(points, height, False)
     add(home_map[None, :2], heights.cover, False)
-    return WaypointProgress(np.vstack(places), np.array(covering))
+    return WaypointProgress(np.vstack(positions), np.array(covering))
 
 
 def _transit(
     field: CoverageField,
-    ways: CoverageCells,
+    passable: CoverageCells,
     heights: HeightProfile,
     uav: int,
     start: Array,
@@ -100,18 +100,20 @@ def _transit(
     cells = field.cells_at(np.stack([start, goal]))
     if int(np.abs(cells[0] - cells[1]).sum()) <= 1:
         return []
-    numbers = [ways.number(row, column) for row, column in cells.tolist()]
-    way = ways.way(numbers[0], numbers[1]) if min(numbers) >= 0 else []
-    if not way and heights.over <= 0.0:
+    numbers = [passable.number(row, column) for row, column in cells.tolist()]
+    path = passable.path(numbers[0], numbers[1]) if min(numbers) >= 0 else []
+    if not path and heights.over <= 0.0:
         return []
-    height = heights.transit(uav, over=not way)
-    between = field.centres(_corners(ways.places()[way])) if way else np.empty((0, 2))
+    height = heights.transit(uav, over=not path)
+    between = (
+        field.centres(_corners(passable.rows_and_columns()[path])) if path else np.empty((0, 2))
+    )
     return [(np.vstack([start[None], between, goal[None]]), height)]
 
 
-def _corners(way: NDArray[np.int64]) -> NDArray[np.int64]:
+def _corners(path: NDArray[np.int64]) -> NDArray[np.int64]:
     """Returns the cells (K, 2) of a path at which it turns, without its ends."""
-    steps = np.diff(way, axis=0)
+    steps = np.diff(path, axis=0)
     turns = (steps[1:] != steps[:-1]).any(axis=1)
-    corners: NDArray[np.int64] = way[1:-1][turns]
+    corners: NDArray[np.int64] = path[1:-1][turns]
     return corners

@@ -17,10 +17,10 @@ _FREE, _UNKNOWN, _OCCUPIED = 254, 205, 0
 
 def shades(values: NDArray[np.int8]) -> NDArray[np.uint8]:
     """Returns nav_msgs/OccupancyGrid values (rows, columns) as grey, first row at the top."""
-    picture = np.full(values.shape, _UNKNOWN, np.uint8)
-    picture[values == 0] = _FREE
-    picture[values > 50] = _OCCUPIED
-    return picture[::-1]
+    image_path = np.full(values.shape, _UNKNOWN, np.uint8)
+    image_path[values == 0] = _FREE
+    image_path[values > 50] = _OCCUPIED
+    return image_path[::-1]
 
 
 def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: float) -> list[Path]:
@@ -32,17 +32,17 @@ def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: floa
         They cannot be written.
 
     """
-    picture, told = stem.with_suffix(".pgm"), stem.with_suffix(".yaml")
+    image_path, metadata_path = stem.with_suffix(".pgm"), stem.with_suffix(".yaml")
     rows, columns = values.shape
     text = (
-        f"image: {picture.name}\nmode: trinary\nresolution: {cell_m:g}\n"
+        f"image: {image_path.name}\nmode: trinary\nresolution: {cell_m:g}\n"
         f"origin: [{origin[0]:.6g}, {origin[1]:.6g}, 0.0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.196\n"  # with .25 unknown cells are free
     )
     try:
         head = f"P5\n# written by Volery\n{columns} {rows}\n255\n".encode()
-        write_whole(picture, head + shades(values).tobytes())
-        write_whole(told, text)
+        write_whole(image_path, head + shades(values).tobytes())
+        write_whole(metadata_path, text)
     except OSError as error:
         raise DataFileError(f"{stem}: the grid cannot be written: {error.strerror}") from None
-    return [picture, told]
+    return [image_path, metadata_path]

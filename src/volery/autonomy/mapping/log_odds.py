@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.core.compiled import kernel
 
-_HIT, _MISS, _LEAST, _MOST = 0.85, 0.4, -4.0, 6.0
+_HIT, _MISS, _MIN_ODDS, _MAX_ODDS = 0.85, 0.4, -4.0, 6.0
 """ln of the odds of a scan's hit (0.70) and miss (0.60), and bounds (modelling choices)."""
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 """As in nav_msgs/OccupancyGrid."""
@@ -70,17 +70,17 @@ def _draw(
         j = math.floor((ends[k, 0] - origin[0]) / cell)
         if hits[k] and 0 <= i < rows and 0 <= j < columns and scan[i, j] != number:
             scan[i, j] = number
-            odds[i, j] = min(odds[i, j] + _HIT, _MOST)
+            odds[i, j] = min(odds[i, j] + _HIT, _MAX_ODDS)
     for k in range(len(hits)):
         x, y = starts[k, 0], starts[k, 1]
         dx, dy = ends[k, 0] - x, ends[k, 1] - y
         steps = math.ceil(2.0 * max(abs(dx), abs(dy)) / cell)
         for step in range(steps):
-            share = step / steps
-            i = math.floor((y + share * dy - origin[1]) / cell)
-            j = math.floor((x + share * dx - origin[0]) / cell)
+            fraction = step / steps
+            i = math.floor((y + fraction * dy - origin[1]) / cell)
+            j = math.floor((x + fraction * dx - origin[0]) / cell)
             if not (0 <= i < rows and 0 <= j < columns):
                 continue
             if scan[i, j] < number - 1:
                 scan[i, j] = number - 1
-                odds[i, j] = max(odds[i, j] - _MISS, _LEAST)
+                odds[i, j] = max(odds[i, j] - _MISS, _MIN_ODDS)

@@ -14,7 +14,7 @@ from volery.autonomy.mapping.projected_grid import HeightSlab, ProjectedGrid
 from volery.autonomy.mapping.scan_buffer import ScanBuffer
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.list_parameters import declare_mount
-from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.map_frame import MAP, UNKNOWN_POSE, MapFrame
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -36,9 +36,9 @@ from volery.graph.nodes.node import Node
 _SONAR_MEMORY_S = 0.5
 _SILENT_S = 2.0
 """Time without data, or without returns, after which a sensor is reported."""
-_LEAST_HEIGHT_M = 1.0
+_MIN_HEIGHT_M = 1.0
 """Min height above ground for the grid; lower it would show the ground."""
-_MOST_FILES = 100
+_MAX_FILES = 100
 """Max number of files in a map folder, as clients of the graph name them. Modelling choice."""
 
 
@@ -79,7 +79,7 @@ class Mapping(SavedAttributes, Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
         self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
-        self._reach = float(self.declare_parameter("max_range_m", 15.0, min_value=0.1).value)
+        self._max_range_m = float(self.declare_parameter("max_range_m", 15.0, min_value=0.1).value)
         beam_step = int(self.declare_parameter("beam_step", 2, min_value=1).value)
         rate = float(
             self.declare_parameter("scan_rate_hz", 5.0, min_value=0.01, max_value=1000.0).value
@@ -89,7 +89,7 @@ class Mapping(SavedAttributes, Node):
         self._half = float(self.declare_parameter("half_height_m", 0.6, min_value=0.01).value)
         self._folder = self.declare_folder("folder", f"maps{self.get_namespace()}")
         self._limits = MapLimits(self._resolution, extent, nodes)
-        beams = Beams(reach_m=self._reach, every=beam_step)
+        beams = Beams(max_range_m=self._max_range_m, every=beam_step)
         self._intakes = {
             name: ScanBuffer(RayMaker(declare_mount(self, name), beams), rate)
             for name in ("level", "nodding")
@@ -154,16 +154,16 @@ class Mapping(SavedAttributes, Node):
         rays = rays._replace(
             starts=self._frame.to_map(rays.starts), ends=self._frame.to_map(rays.ends)
         )
-        self._octree.insert(rays, self._reach)
-        now, place = self.get_clock().now_ns(), rays.starts[len(rays.starts) // 2]
+        self._octree.insert(rays, self._max_range_m)
+        now, position = self.get_clock().now_ns(), rays.starts[len(rays.starts) // 2]
         self._ground.add(rays.ends, now, rays.hits)
-        self._ground.fit(place, self._ground_below(float(place[2])), now)
-        if place[2] - self._ground.height < _LEAST_HEIGHT_M:
+        self._ground.fit(position, self._ground_below(float(position[2])), now)
+        if position[2] - self._ground.height < _MIN_HEIGHT_M:
             return
         slope = self._ground.slope
-        self._slab_z = float(place[2])
-        self._grid.begin_at(place)
-        height = float(place[2] - slope @ place[:2])
+        self._slab_z = float(position[2])
+        self._grid.begin_at(position)
+        height = float(position[2] - slope @ position[:2])
         self._grid.add(rays, HeightSlab(height, slope, self._half))
 
     def _ground_below(self, z: float) -> float | None:
@@ -208,14 +208,14 @@ class Mapping(SavedAttributes, Node):
         if newest is None or now - newest.time_ns > _SILENT_S * NS_PER_S:
             found.append("no odometry")
         if self._frame.is_lost:
-            found.append(UNKNOWN_PLACE)
+            found.append(UNKNOWN_POSE)
         for name, intake in self._intakes.items():
-            heard, seen = intake.received_ns, intake.seen_ns
-            if heard is None or now - heard > _SILENT_S * NS_PER_S:
+            received_ns, seen_ns = intake.received_ns, intake.seen_ns
+            if received_ns is None or now - received_ns > _SILENT_S * NS_PER_S:
                 found.append(f"the {name} LIDAR is silent")
             elif intake.stuck:
                 found.append(f"the {name} LIDAR repeats itself")
-            elif seen is None or now - seen > _SILENT_S * NS_PER_S:
+            elif seen_ns is None or now - seen_ns > _SILENT_S * NS_PER_S:
                 found.append(f"the {name} LIDAR has no returns")
         return found
 
@@ -241,8 +241,8 @@ class Mapping(SavedAttributes, Node):
 
     def _save(self, name: str) -> str:
         path = self._path(name)
-        if not path.exists() and len(list(path.parent.glob("*.bt"))) >= _MOST_FILES:
-            raise NodeError(f"{path.parent} holds {_MOST_FILES} maps already; delete some")
+        if not path.exists() and len(list(path.parent.glob("*.bt"))) >= _MAX_FILES:
+            raise NodeError(f"{path.parent} holds {_MAX_FILES} maps already; delete some")
         data = self._octree.binary()
         write_map(path, data, self._resolution)
         joined = f"{self._octree.nodes} in memory, where equal cubes are not joined"

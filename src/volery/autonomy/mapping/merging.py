@@ -39,15 +39,15 @@ class PlacedMap(NamedTuple):
     placement: Pose | None = None
 
 
-def merged(maps: Sequence[PlacedMap], resolution_m: float, most_cells: int) -> Bytes:
+def merged(maps: Sequence[PlacedMap], resolution_m: float, max_cells: int) -> Bytes:
     """Returns the binary stream of one map in which each cell has the majority's value.
 
-    A tie is an occupied cell. Raises PlanError if the maps have more than `most_cells` cells, or a
+    A tie is an occupied cell. Raises PlanError if the maps have more than `max_cells` cells, or a
     map exceeds the range of an OctoMap.
     """
     cells = sum(int((m.voxels.side.astype(np.int64) ** 3).sum()) for m in maps)
-    if cells > most_cells:
-        raise PlanError(f"the maps have {cells} cells together; at most {most_cells} are merged")
+    if cells > max_cells:
+        raise PlanError(f"the maps have {cells} cells together; at most {max_cells} are merged")
     codes, votes = [], []
     for placed in maps:
         cell, occupied = _cells(placed.voxels)
@@ -118,8 +118,8 @@ def _placed(
 
 def _is_none(placement: Pose, resolution_m: float) -> bool:
     turn = norm(rotations.logarithm(placement.attitude))
-    way = norm(placement.position) / resolution_m
-    return turn < _LEVEL_RAD and way < _LEVEL_CELLS
+    distance = norm(placement.position) / resolution_m
+    return turn < _LEVEL_RAD and distance < _LEVEL_CELLS
 
 
 @kernel

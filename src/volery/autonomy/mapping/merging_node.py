@@ -45,7 +45,7 @@ class MapMerging(SavedAttributes, Node):
         super().__init__("map_merging", **options)
         self._topics = list(self.declare_parameter("topics", ["/uav1/octomap_binary"]).value)
         self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
-        self._most = int(self.declare_parameter("max_cells", 20_000_000, min_value=1).value)
+        self._max_cells = int(self.declare_parameter("max_cells", 20_000_000, min_value=1).value)
         self._maps: dict[str, Any] = {}
         self._placements: dict[str, Pose] = {}
         self._changed = False
@@ -98,7 +98,7 @@ class MapMerging(SavedAttributes, Node):
         placed = [found for topic in sorted(self._maps) if (found := self._placed(topic))]
         reason = ""
         try:
-            data = merged(placed, self._resolution, self._most)
+            data = merged(placed, self._resolution, self._max_cells)
         except PlanError as error:
             reason = str(error)
         else:

@@ -51,9 +51,9 @@ def grid_message(grid: ProjectedGrid, height: float, frame_id: str, now_ns: int)
         return grid_values_message(empty, grid.cell_m, (0.0, 0.0, height), frame_id, now_ns)
     rows, columns = box
     corner = (grid.origin + np.array([columns.start, rows.start])) * grid.cell_m
-    place = (float(corner[0]), float(corner[1]), height)
+    origin = (float(corner[0]), float(corner[1]), height)
     return grid_values_message(
-        occupancy(grid.score[rows, columns]), grid.cell_m, place, frame_id, now_ns
+        occupancy(grid.score[rows, columns]), grid.cell_m, origin, frame_id, now_ns
     )
 
 

@@ -46,9 +46,9 @@ class Voxels(NamedTuple):
 
 def decode_binary(data: Bytes) -> Voxels:
     """Returns the cubes of a binary stream. Raises DataFileError if it is invalid."""
-    most = 4 * len(data)  # two bits a cube
-    corner = np.empty((most, 3), np.int32)
-    side, occupied = np.empty(most, np.int32), np.empty(most, np.bool_)
+    max_cubes = 4 * len(data)  # two bits a cube
+    corner = np.empty((max_cubes, 3), np.int32)
+    side, occupied = np.empty(max_cubes, np.int32), np.empty(max_cubes, np.bool_)
     count = _decode_binary(data, corner, side, occupied)
     if count < 0:
         raise DataFileError(
@@ -63,9 +63,9 @@ def decode_full(data: Bytes) -> Voxels:
 
     Raises DataFileError if it is invalid.
     """
-    most = len(data) // 5
-    corner = np.empty((most, 3), np.int32)
-    side, occupied = np.empty(most, np.int32), np.empty(most, np.bool_)
+    max_cubes = len(data) // 5
+    corner = np.empty((max_cubes, 3), np.int32)
+    side, occupied = np.empty(max_cubes, np.int32), np.empty(max_cubes, np.bool_)
     values = np.frombuffer(data.tobytes() + b"\0" * 4, np.uint8)
     count = _decode_full(values, len(data), corner, side, occupied)
     if count < 0:

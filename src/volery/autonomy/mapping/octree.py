@@ -20,7 +20,7 @@ from volery.core.extras import import_extra
 
 Bytes = NDArray[np.uint8]
 
-_KEPT_SHARE = 0.7
+_KEPT_FRACTION = 0.7
 """Fraction of the cells that is retained when the map is too large (modelling choice)."""
 _FREE_ABOVE_M = 1.5
 _DATA = b"\ndata\n"
@@ -45,7 +45,7 @@ class Octree:
         """Number of nodes of the tree."""
         return int(self._tree.size())
 
-    def insert(self, rays: Rays, reach_m: float, above_m: float = 6.0) -> None:
+    def insert(self, rays: Rays, max_range_m: float, above_m: float = 6.0) -> None:
         """Adds the rays of one scan, all as cast from the middle one's start.
 
         It ignores rays that end more than `above_m` over or below it, and rays without a hit that
@@ -57,9 +57,9 @@ class Octree:
             return
         origin = rays.starts[len(rays.starts) // 2].copy()
         ends = np.empty_like(rays.ends)
-        count = _choose(rays.ends, rays.hits, origin, reach_m, above_m, ends)
+        count = _choose(rays.ends, rays.hits, origin, max_range_m, above_m, ends)
         if count:
-            self._tree.insertPointCloud(ends[:count], origin, reach_m, True, False)
+            self._tree.insertPointCloud(ends[:count], origin, max_range_m, True, False)
         if self.nodes > self._max_nodes:
             self._forget(origin)
 
@@ -96,7 +96,7 @@ class Octree:
         voxels = decode_full(full)
         middle = near / self.resolution_m
         away = voxels.corner[:, :2] + 0.5 * voxels.side[:, None] - middle[:2]
-        radius = float(np.quantile(np.hypot(away[:, 0], away[:, 1]), _KEPT_SHARE))
+        radius = float(np.quantile(np.hypot(away[:, 0], away[:, 1]), _KEPT_FRACTION))
         self._tree = self._tree_of(_with_head(trimmed(full, middle, radius), self.resolution_m))
         self.forgotten += 1
 
@@ -124,7 +124,12 @@ def new_tree(resolution_m: float) -> Any:
 
 @brief_kernel
 def _choose(
-    ends: Array, hits: NDArray[np.bool_], origin: Array, reach: float, above: float, chosen: Array
+    ends: Array,
+    hits: NDArray[np.bool_],
+    origin: Array,
+    max_range: float,
+    above: float,
+    chosen: Array,
 ) -> int:
     """Fills `chosen` with the ends that `Octree.insert` uses; returns their number."""
     count = 0
@@ -136,10 +141,10 @@ def _choose(
                 continue
             for i in range(3):
                 chosen[count, i] = ends[k, i]
-        elif abs(z) <= _FREE_ABOVE_M and length > reach - 0.5:
-            chosen[count, 0] = origin[0] + (x / length) * (reach + 0.5)
-            chosen[count, 1] = origin[1] + (y / length) * (reach + 0.5)
-            chosen[count, 2] = origin[2] + (z / length) * (reach + 0.5)
+        elif abs(z) <= _FREE_ABOVE_M and length > max_range - 0.5:
+            chosen[count, 0] = origin[0] + (x / length) * (max_range + 0.5)
+            chosen[count, 1] = origin[1] + (y / length) * (max_range + 0.5)
+            chosen[count, 2] = origin[2] + (z / length) * (max_range + 0.5)
         else:
             continue
         count += 1

@@ -21,7 +21,7 @@ from volery.core.saved_state import SavedAttributes
 Scores = NDArray[np.int8]
 
 UNKNOWN = -128
-_HIT, _MISS, _LEAST, _MOST = 3, 1, -6, 12
+_HIT, _MISS, _MIN_SCORE, _MAX_SCORE = 3, 1, -6, 12
 """Score of a scan's hit and miss, and bounds: a trunk that moved away is cleared after 12 scans
 (modelling choices).
 """
@@ -52,10 +52,10 @@ class ProjectedGrid(SavedAttributes):
         self.outside = 0
         """Number of hits beyond the grid."""
 
-    def begin_at(self, place: Array) -> None:
-        """Centres the grid on `place` (2+,) m, if it has no position yet."""
+    def begin_at(self, position: Array) -> None:
+        """Centres the grid on `position` (2+,) m, if it has no position yet."""
         if self.origin is None:
-            middle = np.floor(place[:2] / self.cell_m).astype(np.int64)
+            middle = np.floor(position[:2] / self.cell_m).astype(np.int64)
             self.origin = middle - len(self.score) // 2
 
     def add(self, rays: Rays, slab: HeightSlab) -> None:
@@ -121,7 +121,7 @@ def _draw(
         elif scan[i, j] != number:
             scan[i, j] = number
             before = 0 if score[i, j] == UNKNOWN else score[i, j]
-            score[i, j] = min(before + _HIT, _MOST)
+            score[i, j] = min(before + _HIT, _MAX_SCORE)
     for k in range(len(hits)):
         x, y, z = starts[k, 0], starts[k, 1], starts[k, 2]
         dx, dy, dz = ends[k, 0] - x, ends[k, 1] - y, ends[k, 2] - z
@@ -129,9 +129,9 @@ def _draw(
         if steps == 0:
             continue
         for step in range(steps + (0 if hits[k] else 1)):
-            share = step / steps
-            px, py = x + share * dx, y + share * dy
-            if abs(z + share * dz - height - slope[0] * px - slope[1] * py) > half:
+            fraction = step / steps
+            px, py = x + fraction * dx, y + fraction * dy
+            if abs(z + fraction * dz - height - slope[0] * px - slope[1] * py) > half:
                 if step > 0:
                     break  # a straight ray that has left the slab does not return
                 continue
@@ -141,5 +141,5 @@ def _draw(
             if scan[i, j] < number - 1:
                 scan[i, j] = number - 1
                 before = 0 if score[i, j] == UNKNOWN else score[i, j]
-                score[i, j] = max(before - _MISS, _LEAST)
+                score[i, j] = max(before - _MISS, _MIN_SCORE)
     return outside

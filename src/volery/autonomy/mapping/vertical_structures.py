@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 
-_GROUND_WITHIN_M, _LOWEST_SHARE, _LEAST_GROUND = 1.5, 0.05, 6
+_GROUND_WITHIN_M, _LOWEST_FRACTION, _MIN_GROUND = 1.5, 0.05, 6
 """Radius, quantile and min number of the lowest returns around a position that give the ground."""
 _BESIDE_M = 0.3
 _FOOT_M, _BAND_M, _BANDS = 0.6, 0.4, 4
 """Heights above ground: lower limit of the bands (undergrowth, errors of the ground), their height
 and number.
 """
-_LEAST_RETURNS, _LEAST_BANDS = 2, 3
+_MIN_RETURNS, _MIN_BANDS = 2, 3
 _CLEAR_M = 1.0
 """Height below which a return of a level scan may be ground (modelling choices)."""
 _CELL_M = 0.5
@@ -34,14 +34,14 @@ class _Cells:
         order = np.argsort(_key(cells), kind="stable")
         self._points, self._keys = points[order], _key(cells)[order]
 
-    def near(self, place: Array) -> Array:
+    def near(self, position: Array) -> Array:
         """Returns the points (K, 3) within a cell's size of a position (2,)."""
-        i, j = np.floor(place / self._size).astype(np.int64)
+        i, j = np.floor(position / self._size).astype(np.int64)
         low, high = (np.array([(i + a, j + b) for a in (-1, 0, 1)]) for b in (-1, 1))
         first = np.searchsorted(self._keys, _key(low), side="left")
         end = np.searchsorted(self._keys, _key(high), side="right")
         found = np.concatenate([self._points[a:b] for a, b in zip(first, end, strict=True)])
-        return np.asarray(found[np.hypot(*(found[:, :2] - place).T) <= self._size])
+        return np.asarray(found[np.hypot(*(found[:, :2] - position).T) <= self._size])
 
 
 def _key(cells: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -56,12 +56,12 @@ class VerticalStructures:
         self._grounds: dict[tuple[int, int], float] = {}
         self._wide, self._slim = _Cells(points, _GROUND_WITHIN_M), _Cells(points, _BESIDE_M)
 
-    def ground_m(self, place: Array) -> float:
+    def ground_m(self, position: Array) -> float:
         """Returns the ground height at a position (2,) of the map; nan if unknown."""
-        heights = self._wide.near(place)[:, 2]
-        if len(heights) < _LEAST_GROUND:
+        heights = self._wide.near(position)[:, 2]
+        if len(heights) < _MIN_GROUND:
             return float("nan")
-        return float(np.quantile(heights, _LOWEST_SHARE))
+        return float(np.quantile(heights, _LOWEST_FRACTION))
 
     def heights_m(self, seen: Array) -> Array:
         """Returns the heights (K,) of points (K, 3) above the ground; nan if unknown."""
@@ -82,5 +82,5 @@ class VerticalStructures:
             return False
         above = self._slim.near(seen[:2])[:, 2] - ground
         bands = np.floor((above - _FOOT_M) / _BAND_M)
-        met = [int((bands == band).sum()) >= _LEAST_RETURNS for band in range(_BANDS)]
-        return sum(met) >= _LEAST_BANDS
+        met = [int((bands == band).sum()) >= _MIN_RETURNS for band in range(_BANDS)]
+        return sum(met) >= _MIN_BANDS

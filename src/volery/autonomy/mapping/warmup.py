@@ -12,14 +12,14 @@ from volery.autonomy.mapping.projected_grid import HeightSlab, ProjectedGrid
 from volery.autonomy.perception.warmup import some_rays
 from volery.core.arrays import read_only
 
-_REACH_M = 15.0
+_MAX_RANGE_M = 15.0
 
 
 def growing_map() -> None:
     """Compiles the kernels of a map that grows until cells are dropped."""
     rays = some_rays()
     tree = Octree(0.2, max_nodes=1)
-    tree.insert(rays, _REACH_M)
+    tree.insert(rays, _MAX_RANGE_M)
     tree.binary()
     grid = ProjectedGrid(0.4, 4.0)
     grid.begin_at(np.zeros(3))

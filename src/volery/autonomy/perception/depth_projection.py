@@ -15,13 +15,13 @@ from volery.core.errors import GraphError
 from volery.core.rotation_kernels import rotate_vector
 from volery.graph.messages import CameraInfo, Image
 
-Picture = NDArray[np.float32]
+DepthImage = NDArray[np.float32]
 
 _NEAREST_M = 0.3
 """Min depth; nearer points are on the vehicle itself."""
 
 
-def depth_of(image: Image) -> Picture:
+def depth_of(image: Image) -> DepthImage:
     """Returns depths (height, width), m, NaN if unknown. Raises GraphError for other encodings."""
     shape = image.height, image.width
     if image.encoding == "32FC1":
@@ -32,7 +32,7 @@ def depth_of(image: Image) -> Picture:
     raise GraphError(f"depth images must be 32FC1 or 16UC1, not '{image.encoding}'")
 
 
-def region_of(depth: Picture, width: float, height: float, aside: float = 0.0) -> Picture:
+def region_of(depth: DepthImage, width: float, height: float, aside: float = 0.0) -> DepthImage:
     """Returns the centre of an image, with these fractions of its width and height.
 
     aside: shift to the right, as a fraction of the width.
@@ -43,18 +43,20 @@ def region_of(depth: Picture, width: float, height: float, aside: float = 0.0) -
     return depth[max(r - half_r, 0) : r + half_r, max(c - half_c, 0) : c + half_c]
 
 
-def mean_depth(region: Picture, far_m: float) -> float:
+def mean_depth(region: DepthImage, far_m: float) -> float:
     """Returns a region's mean depth as a fraction of `far_m`; larger or unknown depths count 1."""
-    share = np.clip(np.nan_to_num(region, nan=np.inf) / far_m, 0.0, 1.0)
-    return float(share.mean()) if share.size else 1.0
+    fraction = np.clip(np.nan_to_num(region, nan=np.inf) / far_m, 0.0, 1.0)
+    return float(fraction.mean()) if fraction.size else 1.0
 
 
 class DepthProjector:
     """Projects images of a camera at `mount` (3,) m in the body, facing forward, to points."""
 
-    def __init__(self, mount: Sequence[float], reach_m: float = 12.0, keep_every: int = 2) -> None:
+    def __init__(
+        self, mount: Sequence[float], max_range_m: float = 12.0, keep_every: int = 2
+    ) -> None:
         self._mount = np.array(mount, dtype=np.float64)
-        self._reach = reach_m
+        self._max_range_m = max_range_m
         self._every = keep_every
 
     def points(self, image: Image, info: CameraInfo, pose: OdometrySample) -> Array:
@@ -68,7 +70,7 @@ class DepthProjector:
         count = _project(
             depth,
             self._every,
-            self._reach,
+            self._max_range_m,
             np.asarray(info.k, dtype=np.float64),
             (stamp - pose.time_ns) * 1e-9,
             self._mount,
@@ -82,9 +84,9 @@ class DepthProjector:
 
 @kernel
 def _project(
-    depth: Picture,
+    depth: DepthImage,
     every: int,
-    reach: float,
+    max_range: float,
     k: Array,
     since_pose: float,
     mount: Array,
@@ -98,7 +100,7 @@ def _project(
     for v in range(0, depth.shape[0], every):
         for u in range(0, depth.shape[1], every):
             z = float(depth[v, u])
-            if not _NEAREST_M < z < reach:
+            if not _NEAREST_M < z < max_range:
                 continue
             left, up = -(u - k[2]) / k[0] * z, -(v - k[5]) / k[4] * z
             x, y, h = rotate_vector(

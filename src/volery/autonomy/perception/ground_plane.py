@@ -50,7 +50,7 @@ class GroundPlane:
         offset, z = near[:, :2].copy(), near[:, 2].copy()
         base = height_below if height_below is not None else float(self.height_at(position[:2]))
         low = z < position[2] - _BELOW_M
-        is_told = height_below is not None or low.sum() < _ENOUGH
+        is_base_known = height_below is not None or low.sum() < _ENOUGH
         slope = self.slope
         for _ in range(3):
             residual = z - base - offset @ slope
@@ -60,7 +60,7 @@ class GroundPlane:
             slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base)).astype(
                 np.float64
             )
-            if not is_told:
+            if not is_base_known:
                 left = (z - base - offset @ slope)[low]
                 base += float(weight[low] @ left / weight[low].sum())
         steepness = float(np.hypot(*slope))

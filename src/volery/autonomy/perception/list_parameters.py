@@ -8,7 +8,7 @@ from typing import Any
 from volery.core.errors import NodeError
 from volery.graph.nodes.node import Node
 
-_FARTHEST_M = 1e6
+_MAX_DISTANCE_M = 1e6
 
 
 def declare_numbers(
@@ -34,11 +34,13 @@ def declare_points(node: Node, name: str, default: list[list[float]]) -> list[li
     if all(
         isinstance(point, list | tuple)
         and len(point) == len("xy")
-        and all(_is_number(x) and abs(x) <= _FARTHEST_M for x in point)
+        and all(_is_number(x) and abs(x) <= _MAX_DISTANCE_M for x in point)
         for point in value
     ):
         return [[float(x) for x in point] for point in value]
-    raise NodeError(f"{name} must be a list of [x, y], m, within +-{_FARTHEST_M:g}, not {value!r}")
+    raise NodeError(
+        f"{name} must be a list of [x, y], m, within +-{_MAX_DISTANCE_M:g}, not {value!r}"
+    )
 
 
 def declare_mount(node: Node, lidar: str) -> list[float]:

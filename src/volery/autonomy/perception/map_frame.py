@@ -19,7 +19,7 @@ from volery.core.vectors import norm
 from volery.graph.messages import Odometry, TFMessage, frame_name, frame_of, stamp_of
 
 MAP = "map"
-UNKNOWN_PLACE = "pose in the map unknown"
+UNKNOWN_POSE = "pose in the map unknown"
 _SILENT_NS = NS_PER_S
 """Timeout of a transform, by the odometry's clock."""
 

@@ -78,11 +78,11 @@ class MotionHistory:
         between = (after.time_ns - before.time_ns) / NS_PER_S
         if between > gap_s:
             return None
-        share = since / between
+        fraction = since / between
         turned = after.attitude * (1.0 if before.attitude @ after.attitude >= 0.0 else -1.0)
         return Pose(
-            before.position + share * (after.position - before.position),
-            rotations.normalize(before.attitude + share * (turned - before.attitude)),
+            before.position + fraction * (after.position - before.position),
+            rotations.normalize(before.attitude + fraction * (turned - before.attitude)),
         )
 
 

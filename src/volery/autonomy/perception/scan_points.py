@@ -53,9 +53,11 @@ class OdometrySample:
 class ScanProjector:
     """Projects the scans of one LIDAR at `mount` (3,) in the body, its axes along the body's."""
 
-    def __init__(self, mount: Sequence[float], reach_m: float = 15.0, keep_every: int = 2) -> None:
+    def __init__(
+        self, mount: Sequence[float], max_range_m: float = 15.0, keep_every: int = 2
+    ) -> None:
         self._mount = np.array(mount, dtype=np.float64)
-        self._reach = reach_m
+        self._max_range_m = max_range_m
         self._every = keep_every
 
     def points(
@@ -70,7 +72,7 @@ class ScanProjector:
         count = _project(
             scan.ranges,
             self._every,
-            self._reach,
+            self._max_range_m,
             scan.angle_min,
             scan.angle_increment,
             scan.time_increment,
@@ -92,7 +94,7 @@ class ScanProjector:
 def _project(
     ranges: NDArray[np.float32],
     every: int,
-    reach: float,
+    max_range: float,
     angle_min: float,
     angle_increment: float,
     time_increment: float,
@@ -111,7 +113,7 @@ def _project(
     count = 0
     for beam in range(0, len(ranges), every):
         distance = ranges[beam]
-        if not _NEAREST_M < distance < reach:
+        if not _NEAREST_M < distance < max_range:
             continue
         angle = angle_min + beam * angle_increment
         delay = beam * time_increment

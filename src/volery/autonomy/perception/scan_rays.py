@@ -36,7 +36,7 @@ class Rays(NamedTuple):
 class Beams(NamedTuple):
     """Selection and ranges of a LIDAR's beams."""
 
-    reach_m: float = 15.0
+    max_range_m: float = 15.0
     """Max range; beyond it returns count as free space up to it."""
     nearest_m: float = 0.45
     """Min range; nearer returns are from the vehicle itself, or noise."""
@@ -60,25 +60,29 @@ class RayMaker:
         """
         first, last = scan_times(scan)
         tilt = (0.0, 0.0) if nod is None else (nod.at(first), nod.at(last))
-        ways = (motion.at(first), motion.at(last))
-        if tilt[0] is None or tilt[1] is None or ways[0] is None or ways[1] is None:
+        poses = (motion.at(first), motion.at(last))
+        if tilt[0] is None or tilt[1] is None or poses[0] is None or poses[1] is None:
             return None
         if not is_usable(scan):
             return None
-        return self._cast(scan, ways[0], ways[1], tilt[0], tilt[1])
+        return self._cast(scan, poses[0], poses[1], tilt[0], tilt[1])
 
     def _cast(
         self, scan: LaserScan, first: Pose, last: Pose, tilt: float, last_tilt: float
     ) -> Rays:
         ranges = np.asarray(scan.ranges, dtype=np.float32)
-        most = len(ranges) // self._beams.every + 1
-        starts, ends, hits = np.empty((most, 3)), np.empty((most, 3)), np.empty(most, np.bool_)
+        max_rays = len(ranges) // self._beams.every + 1
+        starts, ends, hits = (
+            np.empty((max_rays, 3)),
+            np.empty((max_rays, 3)),
+            np.empty(max_rays, np.bool_),
+        )
         turned = last.attitude * (1.0 if first.attitude @ last.attitude >= 0.0 else -1.0)
         count = _cast(
             ranges,
             self._beams.every,
             self._beams.nearest_m,
-            min(self._beams.reach_m, float(scan.range_max)),
+            min(self._beams.max_range_m, float(scan.range_max)),
             self._beams.blank_m,
             float(scan.angle_min),
             float(scan.angle_increment),
@@ -127,7 +131,7 @@ def _cast(
     ranges: NDArray[np.float32],
     every: int,
     nearest: float,
-    reach: float,
+    max_range: float,
     blank: float,
     angle_min: float,
     angle_increment: float,
@@ -147,31 +151,31 @@ def _cast(
     last = max(len(ranges) - 1, 1)
     for beam in range(0, len(ranges), every):
         distance = ranges[beam]
-        hit = nearest <= distance <= reach
+        hit = nearest <= distance <= max_range
         if hit:
             length = float(distance)
         elif distance == math.inf:
-            length = min(blank, reach)
-        elif distance > reach:
-            length = reach
+            length = min(blank, max_range)
+        elif distance > max_range:
+            length = max_range
         else:
             continue
-        share = beam / last
-        nod = tilt + share * (last_tilt - tilt)
+        fraction = beam / last
+        nod = tilt + fraction * (last_tilt - tilt)
         angle = angle_min + beam * angle_increment
         x, y = length * math.cos(angle), length * math.sin(angle)
-        qx = attitude[0] + share * (last_attitude[0] - attitude[0])
-        qy = attitude[1] + share * (last_attitude[1] - attitude[1])
-        qz = attitude[2] + share * (last_attitude[2] - attitude[2])
-        qw = attitude[3] + share * (last_attitude[3] - attitude[3])
+        qx = attitude[0] + fraction * (last_attitude[0] - attitude[0])
+        qy = attitude[1] + fraction * (last_attitude[1] - attitude[1])
+        qz = attitude[2] + fraction * (last_attitude[2] - attitude[2])
+        qw = attitude[3] + fraction * (last_attitude[3] - attitude[3])
         k = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
         sx, sy, sz = rotate_vector(qx * k, qy * k, qz * k, qw * k, mount[0], mount[1], mount[2])
         ex, ey, ez = rotate_vector(
             qx * k, qy * k, qz * k, qw * k, math.cos(nod) * x, y, -math.sin(nod) * x
         )
-        sx += position[0] + share * (last_position[0] - position[0])
-        sy += position[1] + share * (last_position[1] - position[1])
-        sz += position[2] + share * (last_position[2] - position[2])
+        sx += position[0] + fraction * (last_position[0] - position[0])
+        sy += position[1] + fraction * (last_position[1] - position[1])
+        sz += position[2] + fraction * (last_position[2] - position[2])
         starts[count, 0], starts[count, 1], starts[count, 2] = sx, sy, sz
         ends[count, 0], ends[count, 1], ends[count, 2] = sx + ex, sy + ey, sz + ez
         hits[count] = hit

@@ -49,6 +49,6 @@ class StaticTransforms:
             if frame not in self.joints:
                 break
             frame, joint = self.joints[frame]
-            place = rotations.rotate(joint.attitude, own.position) + joint.position
-            own = Mount(place, rotations.multiply(joint.attitude, own.attitude))
+            position = rotations.rotate(joint.attitude, own.position) + joint.position
+            own = Mount(position, rotations.multiply(joint.attitude, own.attitude))
         return own

@@ -59,8 +59,8 @@ def depth_points() -> None:
     image.height = image.width = 1
     image.encoding, image.data = "32FC1", read_only(np.zeros(4, np.uint8))
     info.k = read_only(np.ones(9))
-    told: tuple[Image, CameraInfo] = image, info
-    DepthProjector([0.0, 0.0, 0.0]).points(*told, a_pose(0))
+    messages: tuple[Image, CameraInfo] = image, info
+    DepthProjector([0.0, 0.0, 0.0]).points(*messages, a_pose(0))
 
 
 def a_scan() -> LaserScan:
@@ -68,8 +68,8 @@ def a_scan() -> LaserScan:
     scan: Any = zero_message("sensor_msgs/msg/LaserScan")
     scan.ranges = read_only(np.array([1.0, 2.0, np.inf], np.float32))
     scan.angle_increment, scan.range_max = 0.1, 10.0
-    told: LaserScan = scan
-    return told
+    message: LaserScan = scan
+    return message
 
 
 def a_pose(time_ns: int) -> OdometrySample:

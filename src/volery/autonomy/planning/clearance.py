@@ -32,9 +32,9 @@ class Clearance(NamedTuple):
         """Returns the largest distance that is measured, m."""
         return FAR_CELLS * self.cell_m
 
-    def at(self, places: Array) -> Array:
+    def at(self, positions: Array) -> Array:
         """Returns the distances (K,) m at positions (K, 3) m; 0 outside of the window."""
-        cells = np.floor(places / self.cell_m).astype(np.int64) - self.low
+        cells = np.floor(positions / self.cell_m).astype(np.int64) - self.low
         inside = ((cells >= 0) & (cells < self.square.shape)).all(axis=1)
         cells[~inside] = 0
         found = np.sqrt(self.square[tuple(cells.T)].astype(np.float64)) * self.cell_m

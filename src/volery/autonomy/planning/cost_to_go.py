@@ -58,11 +58,11 @@ class CostToGo(NamedTuple):
         rows, columns = self.cost.shape
         return float(self.cost[i, j]) if 0 <= i < rows and 0 <= j < columns else math.inf
 
-    def descent(self, xy: Array, reach_m: float = 2.0) -> float | None:
-        """Returns the direction (rad) of the cheapest cell at `reach_m`; None if none is lower."""
+    def descent(self, xy: Array, radius_m: float = 2.0) -> float | None:
+        """Returns the direction (rad) of the cheapest cell at `radius_m`; None if none is lower."""
         angles = np.arange(0.0, 2.0 * math.pi, math.pi / 18.0)
-        around = xy + reach_m * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        costs = [self.at(place) for place in around]
+        around = xy + radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        costs = [self.at(position) for position in around]
         best = int(np.argmin(costs))
         return float(angles[best]) if costs[best] < self.at(xy) else None
 
@@ -152,8 +152,8 @@ def _spread(
                 a, b = i + di, j + dj
                 if (di == 0 and dj == 0) or not (0 <= a < nx and 0 <= b < ny):
                     continue
-                way = cell * (1.4142135623730951 if di != 0 and dj != 0 else 1.0)
-                other = here + way * 0.5 * (price[i, j] + price[a, b])
+                length = cell * (1.4142135623730951 if di != 0 and dj != 0 else 1.0)
+                other = here + length * 0.5 * (price[i, j] + price[a, b])
                 if other < cost[a, b] - 1e-9 and size < len(heap_cost):
                     cost[a, b] = other
                     size = _push(heap_cost, heap_cell, size, other, a * ny + b)

@@ -177,7 +177,7 @@ class Exploration(SavedAttributes, Node):
             return
         if self._goal is None or state not in ("refused", "unreachable"):
             return
-        if goal is not None and np.hypot(*(self._goal.place - goal[:2])) < 0.1:
+        if goal is not None and np.hypot(*(self._goal.position - goal[:2])) < 0.1:
             self._give_up()
 
     # ------------------------------------------------------------------------------------- search
@@ -189,20 +189,20 @@ class Exploration(SavedAttributes, Node):
         if self._frame.is_lost:
             self._since_ns = self.get_clock().now_ns()  # a goal is not blocked by lost tracking
             return
-        place = self._frame.to_map(self._motion.position)
-        self._area.look(place, *self._grid, self._view)
+        position = self._frame.to_map(self._motion.position)
+        self._area.look(position, *self._grid, self._view)
         if self._state is ExplorationState.SEARCHING:
-            self._search(self._area, place)
-        self._covered.publish(Float32(single(self._area.share)))
+            self._search(self._area, position)
+        self._covered.publish(Float32(single(self._area.covered_fraction)))
         self._publish_status()
 
-    def _search(self, area: SearchArea, place: Array) -> None:
+    def _search(self, area: SearchArea, position: Array) -> None:
         now = self.get_clock().now_ns()
         if self._goal is not None:
-            away = float(np.hypot(*(self._goal.place - place[:2])))
-            gain = float(area.gains(self._goal.place[None], self._view)[0][0])
+            away = float(np.hypot(*(self._goal.position - position[:2])))
+            gain = float(area.gains(self._goal.position[None], self._view)[0][0])
             if away < _NEAR * self._view:
-                self._visited.append(self._goal.place)
+                self._visited.append(self._goal.position)
                 self._goal = None
             elif gain < _STALE * self._goal.gain_m2:
                 self._goal = None
@@ -211,38 +211,38 @@ class Exploration(SavedAttributes, Node):
             elif now - self._since_ns > _BLOCKED_S * NS_PER_S:
                 self._give_up()
         if self._goal is None:
-            self._choose(area, place, now)
+            self._choose(area, position, now)
 
-    def _choose(self, area: SearchArea, place: Array, now: int) -> None:
+    def _choose(self, area: SearchArea, position: Array, now: int) -> None:
         assert self._motion is not None
-        moving = self._frame.to_map(self._motion.position + self._motion.velocity) - place
+        moving = self._frame.to_map(self._motion.position + self._motion.velocity) - position
         speed = float(np.hypot(*moving[:2]))
         heading = math.atan2(moving[1], moving[0]) if speed > 0.5 else self._motion.yaw
         left_out = [*self._refused, *self._visited]
-        self._goal = next_viewpoint(area, place[:2], heading, self._view, left_out)
+        self._goal = next_viewpoint(area, position[:2], heading, self._view, left_out)
         if self._goal is not None:
             self._best_m, self._since_ns = math.inf, now
-            self._send(np.array([*self._goal.place, place[2]]))
+            self._send(np.array([*self._goal.position, position[2]]))
             return
-        if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
+        if next_viewpoint(area, position[:2], heading, self._view, self._visited) is not None:
             self._become(
                 ExplorationState.BLOCKED,
                 f"{counted(len(self._refused), 'viewpoint')} cannot be reached",
             )
         else:
             self._become(ExplorationState.DONE, "")
-        self._send(place)
+        self._send(position)
 
     def _give_up(self) -> None:
         assert self._goal is not None
-        self._refused.append(self._goal.place)
+        self._refused.append(self._goal.position)
         self._goal = None
 
     # ---------------------------------------------------------------------------------- publishers
 
-    def _send(self, place: Array) -> None:
+    def _send(self, position: Array) -> None:
         stamp = header(self.get_clock().now_ns(), MAP)
-        self._goals.publish(PoseStamped(stamp, Pose(Point(*place.tolist()), _LEVEL)))
+        self._goals.publish(PoseStamped(stamp, Pose(Point(*position.tolist()), _LEVEL)))
         self._sent += 1
 
     def _become(self, state: ExplorationState, reason: str) -> None:
@@ -253,10 +253,10 @@ class Exploration(SavedAttributes, Node):
         status = {
             "state": str(self._state),
             "reason": self._reason,
-            "covered": 0.0 if area is None else round(area.share, 3),
+            "covered": 0.0 if area is None else round(area.covered_fraction, 3),
             "area_m2": 0.0 if area is None else area.size_m2,
             "searched_m2": 0.0 if area is None else area.seen_m2,
-            "goal": None if goal is None else [round(v, 2) for v in goal.place.tolist()],
+            "goal": None if goal is None else [round(v, 2) for v in goal.position.tolist()],
             "given_up": len(self._refused),
         }
         self._last_status = publish_status(self._status, status, self._last_status)

@@ -60,9 +60,9 @@ def plan_path(
     else:
         with _OMPL:
             states = _search(space, begin, end, search, seed)
-    places = np.array(states)
-    places[:, 2] += [float(space.ground_at(place[:2])) for place in places]
-    return places
+    waypoints = np.array(states)
+    waypoints[:, 2] += [float(space.ground_at(waypoint[:2])) for waypoint in waypoints]
+    return waypoints
 
 
 def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, seed: int) -> Array:

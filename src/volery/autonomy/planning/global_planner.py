@@ -73,14 +73,14 @@ class GlobalPlanner(SavedAttributes, Node):
     )
 
     WARMUP_TASKS = (
-        "volery.autonomy.planning.warmup:ways",
+        "volery.autonomy.planning.warmup:path_planning",
         "volery.autonomy.mapping.warmup:read_maps",
     )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)
         self._height = float(self.declare_parameter("height_m", 3.0, min_value=0.1).value)
-        low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
+        low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[minimum, maximum]")
         if not low < high:
             raise NodeError(f"heights_m must be [min, max] with min < max, not {[low, high]}")
         self._search = PathSearch(
@@ -119,9 +119,9 @@ class GlobalPlanner(SavedAttributes, Node):
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.on_odometry(message)
-        place = OdometrySample.from_odometry(message).position
-        if np.isfinite(place).all():
-            self._position = self._frame.to_map(place)
+        position = OdometrySample.from_odometry(message).position
+        if np.isfinite(position).all():
+            self._position = self._frame.to_map(position)
 
     def _on_goal(self, message: PoseStamped) -> None:
         p = message.pose.position
@@ -187,30 +187,30 @@ class GlobalPlanner(SavedAttributes, Node):
                 self._plan()
 
     def _plan(self) -> None:
-        goal, place = self._goal, self._position
-        if goal is None or place is None:
+        goal, position = self._goal, self._position
+        if goal is None or position is None:
             return
         self._plans += 1
         try:
-            space = self._space(place)
+            space = self._space(position)
             if space is None:
-                waypoints = np.stack([place, goal])
+                waypoints = np.stack([position, goal])
             else:
                 seed = self._seed * 1_000_003 + self._plans
-                waypoints = plan_path(space, place, goal, self._height, self._search, seed)
+                waypoints = plan_path(space, position, goal, self._height, self._search, seed)
         except PlanError as error:
             self._give_up("refused", str(error))
             return
         self._waypoints = waypoints
         self._since_ns = self.get_clock().now_ns()
-        self._best_m = float(np.hypot(*(goal[:2] - place[:2])))
+        self._best_m = float(np.hypot(*(goal[:2] - position[:2])))
         self._send(waypoints)
         length = float(np.linalg.norm(np.diff(waypoints, axis=0), axis=1).sum())
         self._publish_status(
             "planned", "" if space is not None else "no map there: straight path", length
         )
 
-    def _space(self, place: Array) -> VoxelSpace | None:
+    def _space(self, position: Array) -> VoxelSpace | None:
         """Returns the space of the map around vehicle and goal; None where the map holds nothing.
 
         Each failed attempt widens it. Raises PlanError if vehicle and goal are too far apart.
@@ -218,17 +218,17 @@ class GlobalPlanner(SavedAttributes, Node):
         assert self._goal is not None
         if self._map is None:
             return None
-        around, margin = np.stack([place, self._goal]), _MARGIN_M * (1 + self._tries)
+        around, margin = np.stack([position, self._goal]), _MARGIN_M * (1 + self._tries)
         if not self._map.is_near(around, margin):
             return None
         return VoxelSpace(self._map, self._cell, around, margin)
 
-    def _is_clear(self, space: VoxelSpace, waypoints: Array, place: Array) -> bool:
+    def _is_clear(self, space: VoxelSpace, waypoints: Array, position: Array) -> bool:
         """Returns whether the rest of a path is free."""
         heights = np.array([space.ground_at(p[:2]) for p in waypoints])
         states = waypoints.copy()
         states[:, 2] -= heights
-        nearest = int(np.argmin(np.hypot(*(waypoints[:, :2] - place[:2]).T)))
+        nearest = int(np.argmin(np.hypot(*(waypoints[:, :2] - position[:2]).T)))
         radius = 0.75 * self._search.radius_m
         legs = zip(states[nearest:-1], states[nearest + 1 :], strict=True)
         return all(space.is_free_between(a, b, radius) for a, b in legs)
@@ -243,7 +243,9 @@ class GlobalPlanner(SavedAttributes, Node):
 
     def _send(self, waypoints: Array) -> None:
         stamp = header(self.get_clock().now_ns(), MAP)
-        poses = [PoseStamped(stamp, Pose(Point(*place), _LEVEL)) for place in waypoints.tolist()]
+        poses = [
+            PoseStamped(stamp, Pose(Point(*waypoint), _LEVEL)) for waypoint in waypoints.tolist()
+        ]
         self._path.publish(PathMessage(stamp, poses))
 
     def _publish_status(self, state: str, reason: str, length_m: float) -> None:

@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 Scores = NDArray[np.int8]
 
 UNKNOWN = -128
-_HIT, _MISS, _LEAST, _MOST = 4, 1, -3, 12
+_HIT, _MISS, _MIN_SCORE, _MAX_SCORE = 4, 1, -3, 12
 """Score of a scan's hit and miss, and bounds (modelling choices): an obstacle that moves away is
 cleared after 12 scans that pass through it.
 """
@@ -40,10 +40,10 @@ class LocalGrid(SavedAttributes):
         self._low: Integers | None = None
         """Index of the lowest cell (3,), counted from the frame's origin."""
 
-    def move_to(self, place: Array) -> None:
-        """Centres the grid on `place` (3,) m; cells that enter it are unknown."""
+    def move_to(self, position: Array) -> None:
+        """Centres the grid on `position` (3,) m; cells that enter it are unknown."""
         shape = np.array(self._score.shape)
-        low = np.floor(place / self.cell_m).astype(np.int64) - shape // 2
+        low = np.floor(position / self.cell_m).astype(np.int64) - shape // 2
         if self._low is None:
             self._low = low
             return
@@ -72,15 +72,15 @@ class LocalGrid(SavedAttributes):
             starts = rays.starts / self.cell_m
             _cast(starts, ends, self._low, number, self._score, self._scan)
 
-    def clear_around(self, place: Array, radius_m: float) -> None:
-        """Marks unknown cells around the vehicle, at `place` (3,) m, as free."""
+    def clear_around(self, position: Array, radius_m: float) -> None:
+        """Marks unknown cells around the vehicle, at `position` (3,) m, as free."""
         assert self._low is not None
-        _clear(place / self.cell_m, radius_m / self.cell_m, self._low, self._score)
+        _clear(position / self.cell_m, radius_m / self.cell_m, self._low, self._score)
 
-    def window(self, place: Array, shape: tuple[int, int, int]) -> tuple[Scores, Integers]:
-        """Returns the scores of the cells around `place`, and the lowest cell's index (3,)."""
+    def window(self, position: Array, shape: tuple[int, int, int]) -> tuple[Scores, Integers]:
+        """Returns the scores of the cells around `position`, and the lowest cell's index (3,)."""
         assert self._low is not None
-        low = np.floor(place / self.cell_m).astype(np.int64) - np.array(shape) // 2
+        low = np.floor(position / self.cell_m).astype(np.int64) - np.array(shape) // 2
         low = np.clip(low, self._low, self._low + np.array(self._score.shape) - shape)
         scores = np.empty(shape, np.int8)
         _copy(self._score, low, scores)
@@ -122,7 +122,7 @@ def _mark(
         if inside and scan[i, j, m] != number:
             scan[i, j, m] = number
             before = 0 if score[i, j, m] == UNKNOWN else score[i, j, m]
-            score[i, j, m] = min(before + _HIT, _MOST)
+            score[i, j, m] = min(before + _HIT, _MAX_SCORE)
 
 
 @kernel
@@ -152,7 +152,7 @@ def _cast(
             if scan[i, j, m] < number - 1:
                 scan[i, j, m] = number - 1
                 before = 0 if score[i, j, m] == UNKNOWN else score[i, j, m]
-                score[i, j, m] = max(before - _MISS, _LEAST)
+                score[i, j, m] = max(before - _MISS, _MIN_SCORE)
             if ta <= tb and ta <= tc:
                 if ta > 1.0:
                     break
@@ -168,13 +168,19 @@ def _cast(
 
 
 @kernel
-def _clear(place: Array, radius: float, low: Integers, score: Scores) -> None:
+def _clear(position: Array, radius: float, low: Integers, score: Scores) -> None:
     nx, ny, nz = score.shape
-    reach = math.ceil(radius)
-    for a in range(math.floor(place[0]) - reach, math.floor(place[0]) + reach + 1):
-        for b in range(math.floor(place[1]) - reach, math.floor(place[1]) + reach + 1):
-            for c in range(math.floor(place[2]) - reach, math.floor(place[2]) + reach + 1):
-                dx, dy, dz = a + 0.5 - place[0], b + 0.5 - place[1], c + 0.5 - place[2]
+    radius_cells = math.ceil(radius)
+    for a in range(
+        math.floor(position[0]) - radius_cells, math.floor(position[0]) + radius_cells + 1
+    ):
+        for b in range(
+            math.floor(position[1]) - radius_cells, math.floor(position[1]) + radius_cells + 1
+        ):
+            for c in range(
+                math.floor(position[2]) - radius_cells, math.floor(position[2]) + radius_cells + 1
+            ):
+                dx, dy, dz = a + 0.5 - position[0], b + 0.5 - position[1], c + 0.5 - position[2]
                 inside = 0 <= a - low[0] < nx and 0 <= b - low[1] < ny and 0 <= c - low[2] < nz
                 i, j, m = a % nx, b % ny, c % nz
                 near = dx * dx + dy * dy + dz * dz <= radius * radius

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from volery.autonomy.perception.list_parameters import declare_mount
-from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.map_frame import MAP, UNKNOWN_POSE, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.neighbours import Neighbours
@@ -44,9 +44,9 @@ from volery.graph.nodes.node import Node
 class PathLookahead:
     """Tracks progress along positions (K, 3) m, K > 0; progress never decreases."""
 
-    def __init__(self, places: Array, passed_m: float = 0.0) -> None:
-        self.places = places
-        lengths = np.linalg.norm(np.diff(places[:, :2], axis=0), axis=1)
+    def __init__(self, waypoints: Array, passed_m: float = 0.0) -> None:
+        self.waypoints = waypoints
+        lengths = np.linalg.norm(np.diff(waypoints[:, :2], axis=0), axis=1)
         self._along = np.concatenate([[0.0], np.cumsum(lengths)])
         self.passed_m = min(passed_m, float(self._along[-1]))
         """Progress along the path, m."""
@@ -54,34 +54,36 @@ class PathLookahead:
     @property
     def goal(self) -> Array:
         """Returns the end of the path, (3,) m."""
-        return np.asarray(self.places[-1])
+        return np.asarray(self.waypoints[-1])
 
-    def left_m(self, place: Array) -> float:
+    def left_m(self, position: Array) -> float:
         """Returns the distance (m) along the path to its end, from a position beside it."""
         return float(
-            self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - place[:2]))
+            self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - position[:2]))
         )
 
-    def lookahead_point(self, place: Array, ahead_m: float, search_m: float = 15.0) -> Array:
+    def lookahead_point(self, position: Array, ahead_m: float, search_m: float = 15.0) -> Array:
         """Updates the progress and returns the point (2,) m `ahead_m` further along the path.
 
-        Progress becomes the point nearest to `place` within the next `search_m`.
+        Progress becomes the point nearest to `position` within the next `search_m`.
         """
         steps = np.arange(self.passed_m, min(self.passed_m + search_m, self._along[-1]) + 0.25, 0.5)
-        away = np.hypot(*(self._at(steps) - place[:2, None]))
+        away = np.hypot(*(self._at(steps) - position[:2, None]))
         self.passed_m = float(min(steps[int(np.argmin(away))], self._along[-1]))
         return self._at(min(self.passed_m + ahead_m, self._along[-1]))
 
     def _at(self, along: float | Array) -> Array:
         """Returns the point (2, ...) at a distance along the path."""
-        return np.array([np.interp(along, self._along, self.places[:, axis]) for axis in range(2)])
+        return np.array(
+            [np.interp(along, self._along, self.waypoints[:, axis]) for axis in range(2)]
+        )
 
 
 _LOOKAHEAD_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""
-_LEAST_HEIGHT_M = 1.0
+_MIN_HEIGHT_M = 1.0
 """Height above ground below which the planner is inactive: the vehicle takes off or lands."""
-_TELL_S = 1.0
+_STATUS_PERIOD_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
 
 
@@ -198,8 +200,10 @@ class LocalPlanner(SavedAttributes, Node):
         self._sight.on_range(message, self.get_clock().now_ns())
 
     def _on_path(self, message: PathMessage) -> None:
-        places = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses]
-        found = np.array(places, dtype=np.float64).reshape(-1, 3)
+        positions = [
+            [p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses
+        ]
+        found = np.array(positions, dtype=np.float64).reshape(-1, 3)
         if frame_of(message) not in ("", MAP) or not np.isfinite(found).all():
             self._publish_status(
                 "refused",
@@ -222,7 +226,7 @@ class LocalPlanner(SavedAttributes, Node):
         now = self.get_clock().now_ns()
         pose, problems = self._sight.motion.newest, self._sight.problems(now)
         if self._frame.is_lost:
-            problems.append(UNKNOWN_PLACE)
+            problems.append(UNKNOWN_POSE)
         if pose is None:
             self._publish_status("waiting", problems)
             return
@@ -234,7 +238,7 @@ class LocalPlanner(SavedAttributes, Node):
             self._planning.forget()
             self._publish_status("paused", problems)
             return
-        if height < _LEAST_HEIGHT_M:
+        if height < _MIN_HEIGHT_M:
             self._planning.forget()
             self._publish_status("waiting", ["too low above ground to plan", *problems])
             return
@@ -293,12 +297,15 @@ class LocalPlanner(SavedAttributes, Node):
         left = (
             None if lookahead is None or pose is None else round(lookahead.left_m(pose.position), 1)
         )
-        clearance = self._planning.least_m if state == PlannerState.FLYING else None
+        clearance = self._planning.min_clearance_m if state == PlannerState.FLYING else None
         status = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
         if clearance is not None:
             status["clearance_m"] = round(clearance, 2)
         now = self.get_clock().now_ns()
         news = f"{state} {problems}"
-        if news != self._last_status or not 0 <= now - self._last_status_ns < _TELL_S * NS_PER_S:
+        if (
+            news != self._last_status
+            or not 0 <= now - self._last_status_ns < _STATUS_PERIOD_S * NS_PER_S
+        ):
             self._last_status, self._last_status_ns = news, now
             self._status.publish(String(json.dumps(status)))

@@ -31,15 +31,15 @@ class Neighbours:
         fresh = known is not None and now_ns - known.time_ns <= _RESTART_NS
         if fresh and sent_ns <= self._sent_ns[report.name]:
             return
-        place, velocity = np.array([p.x, p.y, p.z]), np.array([v.x, v.y, v.z])
-        self._reports[report.name] = Neighbour(place, velocity, now_ns)
+        position, velocity = np.array([p.x, p.y, p.z]), np.array([v.x, v.y, v.z])
+        self._reports[report.name] = Neighbour(position, velocity, now_ns)
         self._sent_ns[report.name] = sent_ns
 
     def in_odom(self, frame: MapFrame) -> list[Neighbour]:
         """Returns all neighbours, sorted by name, in the odometry frame."""
         moved = []
         for _, other in sorted(self._reports.items()):
-            place = frame.to_odom(other.position)
-            velocity = frame.to_odom(other.position + other.velocity) - place
-            moved.append(Neighbour(place, velocity, other.time_ns))
+            position = frame.to_odom(other.position)
+            velocity = frame.to_odom(other.position + other.velocity) - position
+            moved.append(Neighbour(position, velocity, other.time_ns))
         return moved

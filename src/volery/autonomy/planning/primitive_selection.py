@@ -28,7 +28,7 @@ class PrimitiveVerdicts(NamedTuple):
     """Min distance to an obstacle."""
     unknown: NDArray[np.bool_]
     """Whether it passes through unknown space."""
-    most_m_s2: Array
+    max_acceleration_m_s2: Array
     """Max horizontal acceleration."""
     cost: Array
     """Cost to go at the end of the cruise, plus the cost of closeness to obstacles."""
@@ -61,7 +61,7 @@ def judge(
         near,
         verdicts.nearest_m,
         verdicts.unknown,
-        verdicts.most_m_s2,
+        verdicts.max_acceleration_m_s2,
         verdicts.cost,
     )
     return verdicts
@@ -85,7 +85,7 @@ def _judge(
     near: float,
     nearest: Array,
     unknown: NDArray[np.bool_],
-    most: Array,
+    max_acceleration: Array,
     cost: Array,
 ) -> None:
     nx, ny, nz = square.shape
@@ -94,7 +94,7 @@ def _judge(
     for c in range(len(rise_s)):
         total = rise_s[c] + cruise_s[c] + brake_s[c]
         steps = math.ceil(total / _STEP_S)
-        least, blind, peak, price = math.inf, False, 0.0, 0.0
+        min_distance, blind, peak, price = math.inf, False, 0.0, 0.0
         go = math.inf
         for step in range(steps + 1):
             time = min(step * _STEP_S, total)
@@ -111,7 +111,7 @@ def _judge(
                 blind = True
                 break
             distance = cell * math.sqrt(square[i, j, k])
-            least = min(least, distance)
+            min_distance = min(min_distance, distance)
             blind |= not known[i, j, k]
             peak = max(peak, math.hypot(a[0], a[1]))
             if distance < soft:
@@ -119,7 +119,7 @@ def _judge(
                 price += near * lack * lack * math.hypot(v[0], v[1]) * _STEP_S
             if time <= rise_s[c] + cruise_s[c] + 0.5 * _STEP_S:
                 go = costs[i, j]
-        nearest[c], unknown[c], most[c], cost[c] = least, blind, peak, go + price
+        nearest[c], unknown[c], max_acceleration[c], cost[c] = min_distance, blind, peak, go + price
 
 
 @inner_kernel

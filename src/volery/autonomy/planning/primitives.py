@@ -15,7 +15,7 @@ import numpy as np
 
 from volery.core.arrays import Array
 
-_LEAST_S = 0.5
+_MIN_S = 0.5
 """Shortest change of velocity: the attitude loop cannot follow a shorter one (modelling choice)."""
 
 
@@ -65,7 +65,7 @@ def change_s(dv: Array, limits: MotionLimits) -> Array:
     """Returns the times (C,) s that changes of velocity `dv` (C, 3) m/s need."""
     level = 1.5 * np.hypot(dv[:, 0], dv[:, 1]) / limits.acceleration
     upright = 1.5 * np.abs(dv[:, 2]) / limits.climb_acceleration
-    return np.maximum(np.maximum(level, upright), _LEAST_S)
+    return np.maximum(np.maximum(level, upright), _MIN_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ def at_rest(position: Array) -> PrimitivePath:
 def braking(start: PrimitiveState, limits: MotionLimits) -> PrimitivePath:
     """Returns the shortest stop."""
     seconds = float(change_s(-start.velocity[None], limits)[0])
-    return PrimitivePath(start, np.zeros(3), seconds, 0.0, _LEAST_S)
+    return PrimitivePath(start, np.zeros(3), seconds, 0.0, _MIN_S)
 
 
 def fan(

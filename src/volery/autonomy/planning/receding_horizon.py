@@ -99,7 +99,7 @@ class Observations(NamedTuple):
 class RecedingHorizonPlanner(SavedAttributes):
     """Holds the current plan and computes the next one."""
 
-    STATE = ("doing", "_path", "_began_ns", "yaw", "least_m")
+    STATE = ("doing", "_path", "_began_ns", "yaw", "min_clearance_m")
 
     def __init__(self, policy: PlannerSettings) -> None:
         self.policy = policy
@@ -108,7 +108,7 @@ class RecedingHorizonPlanner(SavedAttributes):
         self._began_ns = 0
         self.yaw = 0.0
         """Wanted heading, rad."""
-        self.least_m = math.inf
+        self.min_clearance_m = math.inf
         """Min distance to obstacles along the current plan, m."""
 
     def state_at(self, time_ns: int) -> PrimitiveState | None:
@@ -167,7 +167,7 @@ class RecedingHorizonPlanner(SavedAttributes):
         stays = len(safe) - 1
         if not moves and best == stays and not np.isfinite(costs.at(start.position[:2])):
             self.doing = PlannerState.BLOCKED
-        self.least_m = float(verdicts.nearest_m[best])
+        self.min_clearance_m = float(verdicts.nearest_m[best])
         return self._commit(candidates.path(best), then_ns)
 
     # ------------------------------------------------------------------------------------ parts
@@ -179,8 +179,8 @@ class RecedingHorizonPlanner(SavedAttributes):
     def _fan(self, start: PrimitiveState, surface: Surface) -> PrimitiveCandidates:
         limits = self.policy.limits
         d, s, o = np.meshgrid(_DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, indexing="ij")
-        way = 0.5 * limits.horizon_s * (s[..., None] * np.stack([np.cos(d), np.sin(d)], axis=-1))
-        end = start.position[:2] + way + 0.5 * limits.horizon_s * start.velocity[:2]
+        offset = 0.5 * limits.horizon_s * (s[..., None] * np.stack([np.cos(d), np.sin(d)], axis=-1))
+        end = start.position[:2] + offset + 0.5 * limits.horizon_s * start.velocity[:2]
         wanted = surface.height_at(end) + o
         rises = (wanted - start.position[2]) / limits.horizon_s
         found = fan(start, _DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, rises, limits)
@@ -203,7 +203,7 @@ class RecedingHorizonPlanner(SavedAttributes):
         wanted = policy.radius_m + policy.radius_s * speed
         here = float(clearance.at(start.position[None])[0])
         safe = verdicts.nearest_m >= np.minimum(wanted, here)
-        safe &= verdicts.most_m_s2 <= _PEAK * policy.limits.acceleration
+        safe &= verdicts.max_acceleration_m_s2 <= _PEAK * policy.limits.acceleration
         if policy.avoid_unknown:
             safe &= ~verdicts.unknown
         return safe
@@ -250,16 +250,18 @@ class RecedingHorizonPlanner(SavedAttributes):
         limits, radius = self.policy.limits, self.policy.radius_m
         hard = limits._replace(acceleration=_HARD * limits.acceleration)
         since = (then_ns - self._began_ns) / NS_PER_S
-        ways = [
+        candidates = [
             (self._path, self._began_ns, since),
             (braking(start, limits), then_ns, 0.0),
             (braking(start, hard), then_ns, 0.0),
         ]
-        least = [_least(path, begin_s, sight.clearance) for path, _, begin_s in ways]
-        enough = [distance >= radius for distance in least]
-        best = enough.index(True) if any(enough) else int(np.argmax(least))
-        self.least_m = least[best]
-        path, self._began_ns, _ = ways[best]
+        clearances = [
+            _min_clearance(path, begin_s, sight.clearance) for path, _, begin_s in candidates
+        ]
+        enough = [distance >= radius for distance in clearances]
+        best = enough.index(True) if any(enough) else int(np.argmax(clearances))
+        self.min_clearance_m = clearances[best]
+        path, self._began_ns, _ = candidates[best]
         self._path = path
         return path
 
@@ -286,7 +288,7 @@ class RecedingHorizonPlanner(SavedAttributes):
         return self._began_ns
 
 
-def _least(path: PrimitivePath, begin_s: float, clearance: Clearance) -> float:
+def _min_clearance(path: PrimitivePath, begin_s: float, clearance: Clearance) -> float:
     """Returns the min distance (m) to obstacles from `begin_s` to the end of a path."""
     times = np.append(np.arange(begin_s, path.duration_s, 0.1), max(path.duration_s, begin_s))
     return float(clearance.at(np.array([path.at(t).position for t in times])).min())

@@ -70,11 +70,11 @@ def half_planes(
         if not finite or not -1.0 <= age <= separation.forget_s:
             continue
         age = max(age, 0.0)
-        place = other.position + age * other.velocity
-        if abs(place[2] - position[2]) > separation.height_m:
+        other_position = other.position + age * other.velocity
+        if abs(other_position[2] - position[2]) > separation.height_m:
             continue
         radius = separation.radius_m + age * separation.growth_m_s
-        x, y = (place[:2] - position[:2]).tolist()
+        x, y = (other_position[:2] - position[:2]).tolist()
         vx, vy = (velocity[:2] - other.velocity[:2]).tolist()
         nx, ny, change = half_plane(x, y, vx, vy, radius, separation.horizon_s, separation.step_s)
         normal = np.array([nx, ny])
@@ -88,7 +88,7 @@ def half_plane(
 ) -> tuple[float, float, float]:
     """Returns the direction (2) in which a relative velocity must change, and by how much (m/s).
 
-    By section 4 of the paper: x, y, m, is the way to the other vehicle and vx, vy, m/s, the
+    By section 4 of the paper: x, y, m, is the offset to the other vehicle and vx, vy, m/s, the
     velocity relative to it. A negative change is one that is allowed.
     """
     square = x * x + y * y

@@ -14,7 +14,7 @@ from volery.core.errors import PlanError
 Mask = NDArray[np.bool_]
 Grid = NDArray[np.int8]
 
-_MOST_CELLS = 4_000_000
+_MAX_CELLS = 4_000_000
 _BLOCKED = 50
 """Values of an occupancy grid from which cells are obstacles."""
 
@@ -29,9 +29,9 @@ class SearchArea:
         self.cell_m = cell_m
         self.low = np.floor(corners.min(axis=0) / cell_m) * cell_m
         shape = np.ceil((corners.max(axis=0) - self.low) / cell_m).astype(np.int64)
-        if int(shape.prod()) > _MOST_CELLS:
+        if int(shape.prod()) > _MAX_CELLS:
             raise PlanError(
-                f"an area of {int(shape.prod())} cells; at most {_MOST_CELLS} are allowed"
+                f"an area of {int(shape.prod())} cells; at most {_MAX_CELLS} are allowed"
             )
         self.inside = _inside(corners, self.middles(tuple(shape.tolist())))
         if not self.inside.any():
@@ -56,35 +56,35 @@ class SearchArea:
         return float(np.count_nonzero(self.seen & self.inside)) * self.cell_m**2
 
     @property
-    def share(self) -> float:
+    def covered_fraction(self) -> float:
         """Returns the observed fraction of the area."""
         return self.seen_m2 / self.size_m2
 
     def look(
-        self, place: Array, grid: Grid, grid_low: Array, grid_cell: float, view_m: float
+        self, position: Array, grid: Grid, grid_low: Array, grid_cell: float, view_m: float
     ) -> None:
-        """Marks all cells within `view_m` of `place` (2+,) m without an obstacle between."""
+        """Marks all cells within `view_m` of `position` (2+,) m without an obstacle between."""
         _look(
-            float(place[0]), float(place[1]), grid, grid_low, grid_cell, view_m,
+            float(position[0]), float(position[1]), grid, grid_low, grid_cell, view_m,
             self.low, self.cell_m, self.seen,
         )  # fmt: skip
 
-    def gains(self, places: Array, view_m: float) -> tuple[Array, Array]:
-        """Returns the unobserved area (K,) m^2 within `view_m` of `places` (K, 2), and its worth.
+    def gains(self, positions: Array, view_m: float) -> tuple[Array, Array]:
+        """Returns the unobserved area (K,) m^2 within `view_m` of positions (K, 2), and its worth.
 
         Cells between the border and observed cells are worth up to three times as much as cells in
         the open: the UAV would have to return for them.
         """
         new = self.inside & ~self.seen
         worth = np.where(new, 1.0 + 2.0 * _blurred(~new, round(view_m / self.cell_m)), 0.0)
-        gains, worths = np.empty(len(places)), np.empty(len(places))
-        _gains(places, worth, self.low, self.cell_m, view_m, gains, worths)
+        gains, worths = np.empty(len(positions)), np.empty(len(positions))
+        _gains(positions, worth, self.low, self.cell_m, view_m, gains, worths)
         return gains, worths
 
 
-def _inside(corners: Array, places: Array) -> Mask:
+def _inside(corners: Array, positions: Array) -> Mask:
     """Returns whether positions (..., 2) lie in a polygon, by ray casting to the east."""
-    x, y = places[..., 0], places[..., 1]
+    x, y = positions[..., 0], positions[..., 1]
     odd = np.zeros(x.shape, np.bool_)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if ay == by:
@@ -94,11 +94,11 @@ def _inside(corners: Array, places: Array) -> Mask:
     return odd
 
 
-def _blurred(mask: Mask, reach: int) -> Array:
-    """Returns the fraction (nx, ny) of set cells within `reach` cells; cells outside are set."""
-    wide = np.pad(mask, reach + 1, constant_values=True)
+def _blurred(mask: Mask, radius: int) -> Array:
+    """Returns the fraction (nx, ny) of set cells within `radius` cells; cells outside are set."""
+    wide = np.pad(mask, radius + 1, constant_values=True)
     total = np.cumsum(np.cumsum(wide, axis=0, dtype=np.float64), axis=1)
-    width = 2 * reach + 1
+    width = 2 * radius + 1
     box = total[width:, width:] - total[:-width, width:]
     box += total[:-width, :-width] - total[width:, :-width]
     nx, ny = mask.shape
@@ -143,7 +143,7 @@ def _look(
 
 @kernel
 def _gains(
-    places: Array,
+    positions: Array,
     worth: Array,
     low: Array,
     cell: float,
@@ -151,13 +151,13 @@ def _gains(
     gains: Array,
     worths: Array,
 ) -> None:
-    reach = math.ceil(view / cell)
-    for p in range(len(places)):
-        ci = math.floor((places[p, 0] - low[0]) / cell)
-        cj = math.floor((places[p, 1] - low[1]) / cell)
+    radius_cells = math.ceil(view / cell)
+    for p in range(len(positions)):
+        ci = math.floor((positions[p, 0] - low[0]) / cell)
+        cj = math.floor((positions[p, 1] - low[1]) / cell)
         count, total = 0, 0.0
-        for i in range(max(ci - reach, 0), min(ci + reach + 1, worth.shape[0])):
-            for j in range(max(cj - reach, 0), min(cj + reach + 1, worth.shape[1])):
+        for i in range(max(ci - radius_cells, 0), min(ci + radius_cells + 1, worth.shape[0])):
+            for j in range(max(cj - radius_cells, 0), min(cj + radius_cells + 1, worth.shape[1])):
                 near = ((i - ci) ** 2 + (j - cj) ** 2) * cell * cell <= view * view
                 if near and worth[i, j] > 0.0:
                     count += 1

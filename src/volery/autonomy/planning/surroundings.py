@@ -41,7 +41,7 @@ class Surroundings(SavedAttributes):
         """Names of LIDARs that repeat their scans."""
         self._received_ns: dict[str, int] = {}
         """Stamp of the newest new scan of each LIDAR, ns."""
-        self._taken_ns: dict[str, int] = {}
+        self._accepted_ns: dict[str, int] = {}
         self._seen_ns: dict[str, int] = {}
         self._ground = GroundPlane()
         self._range: tuple[int, float] | None = None
@@ -56,7 +56,7 @@ class Surroundings(SavedAttributes):
         "_repeats",
         "_stuck",
         "_received_ns",
-        "_taken_ns",
+        "_accepted_ns",
         "_seen_ns",
         "_ground",
         "_range",
@@ -78,24 +78,24 @@ class Surroundings(SavedAttributes):
     def on_scan(self, name: str, scan: LaserScan, now_ns: int) -> None:
         """Adds a scan of LIDAR `name`."""
         stamp = stamp_of(scan)
-        heard = self._received_ns.get(name)
-        if heard is not None and heard - _JUMP_BACK_NS <= stamp <= heard:
+        received_ns = self._received_ns.get(name)
+        if received_ns is not None and received_ns - _JUMP_BACK_NS <= stamp <= received_ns:
             return  # repeated message
         if self._repeats[name].are_reported_by(scan):
             self._stuck.add(name)
             return
         self._stuck.discard(name)
         self._received_ns[name] = stamp
-        taken = self._taken_ns.get(name)
-        due = 0 if taken is None else taken + self._period_ns - NS_PER_S // 200
-        is_due = taken is None or not taken <= stamp < due
+        accepted_ns = self._accepted_ns.get(name)
+        due = 0 if accepted_ns is None else accepted_ns + self._period_ns - NS_PER_S // 200
+        is_due = accepted_ns is None or not accepted_ns <= stamp < due
         if not is_due and name != "nodding":
             return
         newest = self.motion.newest
         if newest is None:
             return
         if is_due:
-            self._taken_ns[name] = stamp
+            self._accepted_ns[name] = stamp
         rays = self._makers[name].rays(scan, self.motion, self._nod if name == "nodding" else None)
         if rays is None or len(rays.hits) == 0:
             return
@@ -141,11 +141,11 @@ class Surroundings(SavedAttributes):
         level = ground.height - float(ground.slope @ ground.anchor) + height_m
         return Surface(level, ground.slope.copy())
 
-    def clearance(self, place: Array) -> Clearance:
-        """Returns the distances to obstacles around `place` (3,) m."""
-        self._grid.move_to(place)
-        self._grid.clear_around(place, _BUBBLE_M)
-        scores, low = self._grid.window(place, _WINDOW)
+    def clearance(self, position: Array) -> Clearance:
+        """Returns the distances to obstacles around `position` (3,) m."""
+        self._grid.move_to(position)
+        self._grid.clear_around(position, _BUBBLE_M)
+        scores, low = self._grid.window(position, _WINDOW)
         return clearance_of(scores, low, self._grid.cell_m, self._upright_cells)
 
     @staticmethod

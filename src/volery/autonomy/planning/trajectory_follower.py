@@ -120,9 +120,9 @@ class TrajectoryFollower(SavedAttributes, Node):
     def _fly(self, plan: TrajectorySamples, pose: OdometrySample, now: int) -> None:
         age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
         here = pose.position + pose.velocity * age_s
-        place, _ = plan.at(now)
+        setpoint, _ = plan.at(now)
         _, velocity = plan.at(now + self._lookahead_ns)
-        off = place - here
+        off = setpoint - here
         if norm(off) > _OFF_M:
             self._publish_status("stopped", "too far from the plan")
             velocity, off = np.zeros(3), np.zeros(3)

@@ -51,10 +51,10 @@ class TrajectorySamples(NamedTuple):
             back = (int(self.time_ns[0]) - time_ns) / NS_PER_S
             return self.position[0] - back * self.velocity[0], self.velocity[0]
         span = int(self.time_ns[row + 1] - self.time_ns[row]) / NS_PER_S
-        share = (time_ns - int(self.time_ns[row])) / NS_PER_S / span
+        fraction = (time_ns - int(self.time_ns[row])) / NS_PER_S / span
         v0, v1 = self.velocity[row], self.velocity[row + 1]
-        velocity = v0 + share * (v1 - v0)
-        return self.position[row] + share * span * 0.5 * (v0 + velocity), velocity
+        velocity = v0 + fraction * (v1 - v0)
+        return self.position[row] + fraction * span * 0.5 * (v0 + velocity), velocity
 
 
 def trajectory_message(

@@ -16,11 +16,11 @@ from volery.autonomy.planning.search_area import SearchArea
 from volery.core.arrays import Array
 
 _TURN = 0.1
-_WAY_M = 80.0
+_PATH_SCALE_M = 80.0
 """Costs, in view discs: a reversal costs a tenth, a path of 80 m a whole disc (modelling
 choices).
 """
-_LEAST_SHARE = 0.06
+_MIN_FRACTION = 0.06
 """Min fraction of the view disc that must be new."""
 _APART_M = 2.0
 """Min distance between viewpoints and excluded positions."""
@@ -29,18 +29,18 @@ _APART_M = 2.0
 class Viewpoint(NamedTuple):
     """Position (2,) m of a viewpoint, and the new area m^2 that it observes."""
 
-    place: Array
+    position: Array
     gain_m2: float
 
 
 def next_viewpoint(
     area: SearchArea,
-    place: Array,
+    position: Array,
     heading: float,
     view_m: float,
     left_out: Sequence[Array] = (),
 ) -> Viewpoint | None:
-    """Returns the best viewpoint from `place` (2,) m; None if no gain is worth the distance.
+    """Returns the best viewpoint from `position` (2,) m; None if no gain is worth the distance.
 
     heading: of the flight, rad. left_out: positions (2,) that are unreachable or were visited.
     """
@@ -51,15 +51,15 @@ def next_viewpoint(
         return None
     gains, worths = area.gains(spots, view_m)
     disc = math.pi * view_m**2
-    enough = gains >= _LEAST_SHARE * disc
+    enough = gains >= _MIN_FRACTION * disc
     if not enough.any():
         return None
     spots, gains, worths = spots[enough], gains[enough], worths[enough]
-    way = spots - place
-    length = np.hypot(way[:, 0], way[:, 1])
-    turn = np.abs(np.arctan2(way[:, 1], way[:, 0]) - heading)
+    offsets = spots - position
+    length = np.hypot(offsets[:, 0], offsets[:, 1])
+    turn = np.abs(np.arctan2(offsets[:, 1], offsets[:, 0]) - heading)
     turn = np.minimum(turn, 2.0 * math.pi - turn) / math.pi
-    utility = worths / disc - length / _WAY_M - _TURN * turn
+    utility = worths / disc - length / _PATH_SCALE_M - _TURN * turn
     best = int(np.argmax(utility))
     return Viewpoint(spots[best], float(gains[best]))
 

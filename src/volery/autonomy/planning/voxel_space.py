@@ -27,7 +27,7 @@ _ABOVE_M = 7.0
 """Height above ground up to which obstacles are stored."""
 _TRUNK_FOOT_M = 0.8
 """Height above the lowest point of a column below which occupied cells are ground or growth."""
-_MOST_COLUMNS = 2_000_000
+_MAX_COLUMNS = 2_000_000
 _FAR_CELLS = 5
 
 
@@ -67,7 +67,7 @@ class VoxelSpace:
         high = around[:, :2].max(axis=0) + margin_m
         self._low = np.floor(low / _GROUND_M) * _GROUND_M
         shape = np.ceil((high - self._low) / _GROUND_M).astype(np.int64)
-        if int(shape.prod()) * (_GROUND_M / cell_m) ** 2 > _MOST_COLUMNS:
+        if int(shape.prod()) * (_GROUND_M / cell_m) ** 2 > _MAX_COLUMNS:
             raise PlanError(
                 f"start and goal span {shape[0] * _GROUND_M:g} m x {shape[1] * _GROUND_M:g} m: "
                 "too far apart to plan a path"
@@ -80,9 +80,9 @@ class VoxelSpace:
         self.ground = _ground(lowest, self._low, shape)
         cells = np.ceil(shape * _GROUND_M / cell_m).astype(np.int64)
         levels = math.ceil(_ABOVE_M / cell_m)
-        standing = np.zeros((*cells, levels), np.bool_)
-        _mark(middle, side, self.ground, self._low, cell_m, standing)
-        square = squared_distances(standing, _FAR_CELLS)
+        occupied = np.zeros((*cells, levels), np.bool_)
+        _mark(middle, side, self.ground, self._low, cell_m, occupied)
+        square = squared_distances(occupied, _FAR_CELLS)
         self._distance: Floats = (np.sqrt(square) * cell_m).astype(np.float32)
 
     def box(self) -> list[tuple[float, float]]:
@@ -95,11 +95,11 @@ class VoxelSpace:
         at = (xy - self._low) / _GROUND_M - 0.5
         limit = np.array(self.ground.shape) - 1
         first = np.clip(np.floor(at).astype(np.int64), 0, np.maximum(limit - 1, 0))
-        share = np.clip(at - first, 0.0, 1.0)
+        fraction = np.clip(at - first, 0.0, 1.0)
         i, j = first.tolist()
         a, b = min(i + 1, int(limit[0])), min(j + 1, int(limit[1]))
-        along = (1 - share[0]) * self.ground[i, [j, b]] + share[0] * self.ground[a, [j, b]]
-        return float((1 - share[1]) * along[0] + share[1] * along[1])
+        along = (1 - fraction[0]) * self.ground[i, [j, b]] + fraction[0] * self.ground[a, [j, b]]
+        return float((1 - fraction[1]) * along[0] + fraction[1] * along[1])
 
     def is_free(self, x: float, y: float, h: float, radius_m: float) -> bool:
         """Returns whether a state is at least `radius_m` from obstacles."""
@@ -125,7 +125,7 @@ class VoxelSpace:
         bx, by, bh = b.tolist()
         return self.is_free_leg(ax, ay, ah, bx, by, bh, radius_m)
 
-    def free_near(self, place: Array, radius_m: float, search_m: float = 3.0) -> Array | None:
+    def free_near(self, position: Array, radius_m: float, search_m: float = 3.0) -> Array | None:
         """Returns the nearest free state (3,) within `search_m`, at the same height; else None.
 
         It searches along rings, a cell apart.
@@ -133,9 +133,9 @@ class VoxelSpace:
         for ring in np.arange(0.0, search_m + 1e-9, self.cell_m):
             count = max(1, math.ceil(2.0 * math.pi * ring / self.cell_m))
             for angle in np.arange(count) * (2.0 * math.pi / count):
-                x, y = place[0] + ring * math.cos(angle), place[1] + ring * math.sin(angle)
-                if self.is_free(float(x), float(y), float(place[2]), radius_m):
-                    return np.array([x, y, place[2]])
+                x, y = position[0] + ring * math.cos(angle), position[1] + ring * math.sin(angle)
+                if self.is_free(float(x), float(y), float(position[2]), radius_m):
+                    return np.array([x, y, position[2]])
         return None
 
 
@@ -167,9 +167,9 @@ def _neighbours(ground: Array) -> Array:
 
 @kernel
 def _mark(
-    middle: Array, side: Array, ground: Array, low: Array, cell: float, standing: NDArray[np.bool_]
+    middle: Array, side: Array, ground: Array, low: Array, cell: float, occupied: NDArray[np.bool_]
 ) -> None:
-    nx, ny, nz = standing.shape
+    nx, ny, nz = occupied.shape
     for v in range(len(side)):
         half = 0.5 * side[v]
         gi = min(max(int((middle[v, 0] - low[0]) / _GROUND_M), 0), ground.shape[0] - 1)
@@ -189,7 +189,7 @@ def _mark(
                     max(math.floor((above - half + 1e-6) / cell), 0),
                     min(math.floor((above + half - 1e-6) / cell) + 1, nz),
                 ):
-                    standing[i, j, k] = True
+                    occupied[i, j, k] = True
 
 
 @inline_kernel
@@ -222,8 +222,8 @@ def _leg(
     length = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bh - ah) ** 2)
     steps = max(1, math.ceil(2.0 * length / cell))
     for step in range(steps + 1):
-        share = step / steps
-        x, y, h = ax + share * (bx - ax), ay + share * (by - ay), ah + share * (bh - ah)
+        fraction = step / steps
+        x, y, h = ax + fraction * (bx - ax), ay + fraction * (by - ay), ah + fraction * (bh - ah)
         if _distance_at(x, y, h, low_x, low_y, cell, distance) < radius:
             return False
     return True

@@ -29,7 +29,7 @@ def searched_area() -> None:
     area.gains(np.zeros((1, 2)), 1.0)
 
 
-def ways() -> None:
+def path_planning() -> None:
     """Compiles the kernels of the path planning space."""
     space = VoxelSpace(SolidVoxels(np.zeros((1, 3)), np.ones(1)), 0.4, np.zeros((1, 2)), 2.0)
     space.is_free(0.0, 0.0, 1.0, 0.1)

@@ -27,8 +27,8 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-_FARTHEST_M = 1e6
-_MOST_GATES = 1000
+_MAX_DISTANCE_M = 1e6
+_MAX_GATES = 1000
 
 
 class TrajectoryInput(NodeInput):
@@ -63,7 +63,7 @@ class TrajectoryInput(NodeInput):
         samples, frame = samples_of(message), frame_of(message)
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
-        elif samples is None or float(np.abs(samples.position).max()) > _FARTHEST_M:
+        elif samples is None or float(np.abs(samples.position).max()) > _MAX_DISTANCE_M:
             self._refuse("needs points with finite positions and velocities at increasing times")
         else:
             self._samples = samples
@@ -112,7 +112,7 @@ class GatesInput(NodeInput):
         frame, gates = frame_of(path), np.array([_gate_of(p.pose) for p in path.poses])
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
-        elif not 0 < len(gates) <= _MOST_GATES or not _are_possible(gates):
+        elif not 0 < len(gates) <= _MAX_GATES or not _are_possible(gates):
             self._refuse("are not finite, too many, or none")
         else:
             self._start(gates)
@@ -125,8 +125,8 @@ class GatesInput(NodeInput):
     def _pass(self, pose: OdometrySample) -> None:
         if self._last is not None and self._next < len(self.gates) - 1:
             gate = self.gates[self._next : self._next + 1]
-            way = in_gates(np.stack([self._last, pose.position]), gate)[:, 0]
-            self._next += int(passes(way[0], way[1], self._room))
+            segment = in_gates(np.stack([self._last, pose.position]), gate)[:, 0]
+            self._next += int(passes(segment[0], segment[1], self._room))
         self._last = pose.position
 
 
@@ -136,8 +136,10 @@ def _point(samples: TrajectorySamples, time_ns: int) -> Array:
     if row == len(samples.time_ns):
         return np.asarray(samples.position[-1])
     first, last = samples.time_ns[row - 1 : row + 1].tolist()
-    share = max(time_ns - first, 0) / (last - first)
-    return np.asarray(samples.position[row - 1] * (1.0 - share) + samples.position[row] * share)
+    fraction = max(time_ns - first, 0) / (last - first)
+    return np.asarray(
+        samples.position[row - 1] * (1.0 - fraction) + samples.position[row] * fraction
+    )
 
 
 def _gates_of(value: object) -> Array:
@@ -156,4 +158,4 @@ def _gate_of(pose: Pose) -> list[float]:
 
 
 def _are_possible(gates: Array) -> bool:
-    return bool(np.isfinite(gates).all()) and float(np.abs(gates).max()) <= _FARTHEST_M
+    return bool(np.isfinite(gates).all()) and float(np.abs(gates).max()) <= _MAX_DISTANCE_M

@@ -1,4 +1,4 @@
-"""Gates that are flown through: when a way passes one, and which are ahead.
+"""Gates that are flown through: when a path passes one, and which are ahead.
 
 A gate is (x, y, z, yaw) of its centre, m and rad, map. It is upright; its direction is its x axis,
 horizontal; y and z span its opening. Environments and nodes call the same functions.
@@ -21,18 +21,18 @@ def in_gates(position: Array, gates: Array) -> Array:
 
 
 def off_centre(before: Array, now: Array) -> Array:
-    """Returns how far (...) from the centre, along y or z, a way meets the gate's plane, m.
+    """Returns how far (...) from the centre, along y or z, a path meets the gate's plane, m.
 
-    before, now: (..., 3) ends of the way in the gate's frame.
+    before, now: (..., 3) ends of the path in the gate's frame.
     """
     step = now[..., 0] - before[..., 0]
-    share = np.clip(-before[..., 0] / np.where(step == 0.0, 1.0, step), 0.0, 1.0)
-    crossing = before + share[..., None] * (now - before)
+    fraction = np.clip(-before[..., 0] / np.where(step == 0.0, 1.0, step), 0.0, 1.0)
+    crossing = before + fraction[..., None] * (now - before)
     return np.asarray(np.abs(crossing[..., 1:]).max(axis=-1))
 
 
 def passes(before: Array, now: Array, room_m: float) -> NDArray[np.bool_]:
-    """Returns whether a way (..., 3) passes the gate forwards, at most `room_m` off its centre."""
+    """Returns whether a path (..., 3) passes the gate forwards, at most `room_m` off its centre."""
     forward = (before[..., 0] < 0.0) & (now[..., 0] >= 0.0)
     return np.asarray(forward & (off_centre(before, now) <= room_m))
 

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from volery.autonomy.perception.list_parameters import declare_numbers
-from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.map_frame import MAP, UNKNOWN_POSE, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
@@ -21,7 +21,7 @@ from volery.core.vectors import norm
 from volery.graph.messages import Odometry, PoseStamped, frame_of
 from volery.graph.nodes.node import Node
 
-_FARTHEST_M = 1e6
+_MAX_DISTANCE_M = 1e6
 
 
 class NodeInput(SavedAttributes):
@@ -73,7 +73,7 @@ class OdometryInput(NodeInput):
 
     def fault(self, now_ns: int) -> str:
         """Returns why there is no usable pose; see `NodeInput.fault`."""
-        return super().fault(now_ns) or (UNKNOWN_PLACE if self.frame.is_lost else "")
+        return super().fault(now_ns) or (UNKNOWN_POSE if self.frame.is_lost else "")
 
     def _on_odometry(self, message: Odometry) -> None:
         pose, problem = usable_pose(self.frame.pose_in_map(message))
@@ -90,7 +90,7 @@ def usable_pose(pose: OdometrySample) -> tuple[OdometrySample | None, str]:
     vectors = (pose.position, pose.velocity, pose.omega_body)
     if not all(np.isfinite(v).all() for v in (*vectors, pose.attitude)):
         return None, "is not finite"
-    if not 0.9 < length < 1.1 or float(np.abs(vectors).max()) > _FARTHEST_M:
+    if not 0.9 < length < 1.1 or float(np.abs(vectors).max()) > _MAX_DISTANCE_M:
         return None, "is impossible"
     return replace(pose, attitude=pose.attitude / length), ""
 
@@ -123,7 +123,7 @@ class GoalInput(NodeInput):
         frame = frame_of(message)
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
-        elif not np.isfinite(position).all() or float(np.abs(position).max()) > _FARTHEST_M:
+        elif not np.isfinite(position).all() or float(np.abs(position).max()) > _MAX_DISTANCE_M:
             self._refuse("is not finite")
         else:
             self.position, self.velocity = position, np.zeros(3)

@@ -19,7 +19,7 @@ from volery.core.vectors import norm
 from volery.graph.messages import Image, LaserScan, PoseStamped, frame_of
 from volery.graph.nodes.node import Node
 
-_MOST_BEAMS, _MOST_PIXELS = 100_000, 4_000_000
+_MAX_BEAMS, _MAX_PIXELS = 100_000, 4_000_000
 
 
 class ScanInput(NodeInput):
@@ -40,7 +40,7 @@ class ScanInput(NodeInput):
     def _on_scan(self, scan: LaserScan) -> None:
         count = len(scan.ranges)
         angles: Array = scan.angle_min + scan.angle_increment * np.arange(count, dtype=np.float64)
-        if not 0 < count <= _MOST_BEAMS or not scan.angle_increment > 0.0:
+        if not 0 < count <= _MAX_BEAMS or not scan.angle_increment > 0.0:
             self._refuse("has no beams, or angles that do not increase")
         elif not np.isfinite(angles).all() or np.isnan(scan.ranges).all():
             self._refuse("is not finite")
@@ -63,7 +63,7 @@ class DepthInput(NodeInput):
         node.create_subscription(Image, topic, self._on_image, 1)
 
     def _on_image(self, image: Image) -> None:
-        if not 0 < image.height * image.width <= _MOST_PIXELS:
+        if not 0 < image.height * image.width <= _MAX_PIXELS:
             self._refuse("has no pixels, or too many")
             return
         try:
@@ -91,7 +91,7 @@ class ColourInput(NodeInput):
         size = image.height * image.width * 3
         if image.encoding not in ("rgb8", "bgr8"):
             self._refuse(f"must be rgb8 or bgr8, not '{image.encoding[:40]}'")
-        elif not 0 < size <= 3 * _MOST_PIXELS or len(image.data) != size:
+        elif not 0 < size <= 3 * _MAX_PIXELS or len(image.data) != size:
             self._refuse("has another number of bytes than pixels")
         else:
             pixels = np.asarray(image.data, np.uint8).reshape(image.height, image.width, 3)

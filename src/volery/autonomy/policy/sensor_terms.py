@@ -16,8 +16,8 @@ from volery.core.errors import ScenarioError
 def closeness(distance: ArrayLike, max_distance_m: float) -> NDArray[np.float32]:
     """Returns closeness, 0 to 1, of distances, m: NaN and +inf are 0, -inf (too near) is 1."""
     distance = np.asarray(distance, np.float32)
-    share = np.float32(1.0) - distance / np.float32(max_distance_m)
-    return np.clip(np.where(np.isnan(share), np.float32(0.0), share), 0.0, 1.0)
+    fraction = np.float32(1.0) - distance / np.float32(max_distance_m)
+    return np.clip(np.where(np.isnan(fraction), np.float32(0.0), fraction), 0.0, 1.0)
 
 
 def lidar_sectors(

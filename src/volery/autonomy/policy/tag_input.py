@@ -19,7 +19,7 @@ from volery.core.vectors import norm
 from volery.graph.messages import Odometry, message_type, stamp_of
 from volery.graph.nodes.node import Node
 
-_FARTHEST_M = 1000.0
+_MAX_DISTANCE_M = 1000.0
 _MAX_TAGS = 600
 """More than a family has."""
 
@@ -102,6 +102,6 @@ def _pose_of(pose: Any) -> tuple[Array, Array] | None:
     if not (np.isfinite(position).all() and np.isfinite(attitude).all()):
         return None
     length = float(norm(attitude))
-    if float(np.abs(position).max()) > _FARTHEST_M or not 0.9 < length < 1.1:
+    if float(np.abs(position).max()) > _MAX_DISTANCE_M or not 0.9 < length < 1.1:
         return None
     return position, attitude / length

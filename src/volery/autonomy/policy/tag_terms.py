@@ -2,7 +2,7 @@
 
 A tag's pose comes from a camera, at the time of an image; the policy observes it in the level
 heading frame, carried on by the UAV's own motion since. Frame of a tag: x to the top of its
-picture, y to the left, z out of it.
+image, y to the left, z out of it.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from volery.core.errors import NodeError
 from volery.graph.messages import Odometry, TFMessage
 from volery.graph.nodes.node import Node
 
-_FARTHEST_M = 1e6
+_MAX_DISTANCE_M = 1e6
 
 
 class NeighboursInput(NodeInput):
@@ -76,7 +76,7 @@ class PostsInput(NodeInput):
             posts = np.asarray(value, np.float64).reshape(-1, 3)
         except (TypeError, ValueError):
             posts = np.full((1, 3), np.nan)
-        if not np.isfinite(posts).all() or np.abs(posts).max(initial=0.0) > _FARTHEST_M:
+        if not np.isfinite(posts).all() or np.abs(posts).max(initial=0.0) > _MAX_DISTANCE_M:
             raise NodeError(f"posts must be a list of [x, y, radius], m, not {value!r}")
         self.posts: Array = posts
         """(P, 3) x, y and radius, m, map."""

@@ -58,7 +58,7 @@ def posts(position: Array, radius: Array, *, count: int, range_m: float) -> Arra
 
 
 def _nearest(numbers: Array, distance: Array, count: int) -> Array:
-    """Returns the rows of `numbers` (..., N, S) at the least distances; zeros where N < count."""
+    """Returns the rows of `numbers` (..., N, S) at the smallest distances; 0 where N < count."""
     order = np.argsort(distance, axis=-1, kind="stable")[..., :count, None]
     chosen = np.take_along_axis(numbers, order, axis=-2)
     missing = count - chosen.shape[-2]

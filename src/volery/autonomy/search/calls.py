@@ -11,7 +11,7 @@ from volery.graph.messages import Point, message_type, time_from_ns
 
 JOIN = "volery_interfaces/srv/JoinSearch"
 """Type of the service that calls a teammate."""
-_PERIOD_NS, _MOST = NS_PER_S, 20
+_PERIOD_NS, _MAX_TRIES = NS_PER_S, 20
 """Period and max number of calls to a teammate. Modelling choice."""
 
 
@@ -20,7 +20,7 @@ class RescueClaim(NamedTuple):
 
     stamp_ns: int
     finder: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
 
     @property
     def key(self) -> tuple[int, str]:
@@ -30,15 +30,15 @@ class RescueClaim(NamedTuple):
     def request(self) -> Any:
         """Returns the service request that calls a teammate."""
         return message_type(f"{JOIN}_Request")(
-            time_from_ns(self.stamp_ns), self.finder, Point(*self.place)
+            time_from_ns(self.stamp_ns), self.finder, Point(*self.position)
         )
 
     @classmethod
     def from_request(cls, request: Any) -> RescueClaim:
         """Returns the claim of a request."""
         stamp_ns = request.stamp.sec * NS_PER_S + request.stamp.nanosec
-        place = request.place.x, request.place.y, request.place.z
-        return cls(stamp_ns, request.finder, place)
+        position = request.place.x, request.place.y, request.place.z
+        return cls(stamp_ns, request.finder, position)
 
 
 @dataclass
@@ -70,7 +70,7 @@ class RescueCalls:
         due = [
             (name, call)
             for name, call in self.to.items()
-            if call.tries < _MOST and not call.accepted and self._has_waited(call, now_ns)
+            if call.tries < _MAX_TRIES and not call.accepted and self._has_waited(call, now_ns)
         ]
         for _, call in due:
             call.tries, call.asked_ns = call.tries + 1, now_ns
@@ -79,7 +79,7 @@ class RescueCalls:
     def are_settled(self, now_ns: int) -> bool:
         """Returns whether all teammates have accepted or have been given up."""
         return all(
-            call.accepted or (call.tries >= _MOST and self._has_waited(call, now_ns))
+            call.accepted or (call.tries >= _MAX_TRIES and self._has_waited(call, now_ns))
             for call in self.to.values()
         )
 

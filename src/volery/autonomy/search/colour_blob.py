@@ -25,9 +25,9 @@ class ColourRange(NamedTuple):
     """Lower end of the hue range; 0 is red, 120 green."""
     last_hue_deg: float = 15.0
     """Upper end of the hue range; the range passes through 360 if this end is the smaller one."""
-    least_saturation: float = 0.5
+    min_saturation: float = 0.5
     """(max - min) / max of the three channels."""
-    least_value: float = 0.2
+    min_value: float = 0.2
     """The largest channel, 0 to 1."""
 
 
@@ -35,7 +35,7 @@ class Blob(NamedTuple):
     """Patch of connected pixels."""
 
     pixels: int
-    share: float
+    fraction: float
     """Fraction of the image."""
     u: float
     """Column of its centroid, counted from the centre of the first pixel."""
@@ -82,18 +82,18 @@ def _fill_mask(
     pixels: Pixels,
     first_hue: float,
     last_hue: float,
-    least_saturation: float,
-    least_value: float,
+    min_saturation: float,
+    min_value: float,
     mask: Mask,
 ) -> None:
     for v in range(pixels.shape[0]):
         for u in range(pixels.shape[1]):
             red, green, blue = pixels[v, u]
-            most, least = max(red, green, blue), min(red, green, blue)
-            spread = float(most) - float(least)
-            coloured = spread > 0.0 and spread >= least_saturation * most
+            maximum, minimum = max(red, green, blue), min(red, green, blue)
+            spread = float(maximum) - float(minimum)
+            coloured = spread > 0.0 and spread >= min_saturation * maximum
             mask[v, u] = False
-            if coloured and most >= 255.0 * least_value:
+            if coloured and maximum >= 255.0 * min_value:
                 hue = _hue_deg(float(red), float(green), float(blue), spread)
                 beyond, before = hue >= first_hue, hue <= last_hue
                 around = first_hue > last_hue

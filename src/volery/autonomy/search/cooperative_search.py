@@ -9,8 +9,8 @@ import numpy as np
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.calls import JOIN, RescueCalls, RescueClaim
 from volery.autonomy.search.ground_view import Intrinsics
-from volery.autonomy.search.object_detection import place_seen
-from volery.autonomy.search.search_positions import check_room, places_around, random_waypoint
+from volery.autonomy.search.object_detection import object_position
+from volery.autonomy.search.search_positions import check_room, positions_around, random_waypoint
 from volery.autonomy.search.steering import is_at
 from volery.autonomy.search.team_flight import TeamFlight
 from volery.autonomy.search.teammates import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, SearchPhase
@@ -147,22 +147,22 @@ class CooperativeSearch(TeamFlight):
         if self.phase not in _SEARCHING or self.pose is None or self._intrinsics is None:
             return
         mates = [m.position for m in self.teammates.values() if m.phase is not None]
-        place = place_seen(image, self._intrinsics, self.settings, self.pose, mates)
-        if place is None:
+        position = object_position(image, self._intrinsics, self.settings, self.pose, mates)
+        if position is None:
             return
         if self.phase is SearchPhase.SEARCH:
-            self._see(stamp_of(image), place)
+            self._see(stamp_of(image), position)
         elif is_at(self.pose, self._look_from, _NEAR_M, _REST_M_S):
-            self._looks.append(place)
+            self._looks.append(position)
 
-    def _see(self, stamp_ns: int, place: Array) -> None:
+    def _see(self, stamp_ns: int, position: Array) -> None:
         """Interrupts the search and looks again from above, where height errors matter little."""
         assert self.pose is not None
-        self.claim = RescueClaim(stamp_ns, self.settings.name, _plain(place))
+        self.claim = RescueClaim(stamp_ns, self.settings.name, _plain(position))
         low, high = np.reshape(self._inner, (2, 2))
-        self._look_from, self._looks = self.in_layer(np.clip(place[:2], low, high)), []
-        way = norm(self._look_from - self.pose.position)
-        self._look_s = _LOOK_S + way / self.settings.speed_m_s
+        self._look_from, self._looks = self.in_layer(np.clip(position[:2], low, high)), []
+        distance = norm(self._look_from - self.pose.position)
+        self._look_s = _LOOK_S + distance / self.settings.speed_m_s
         self.enter(SearchPhase.LOOK)
 
     # ----------------------------------------------------------------------------------- behaviour
@@ -178,7 +178,7 @@ class CooperativeSearch(TeamFlight):
         elif self.phase is SearchPhase.LOOK:
             self._look()
         elif self.phase in (SearchPhase.COME, SearchPhase.HOLD):
-            arrived = self.fly_to(self._own_place())
+            arrived = self.fly_to(self._own_search_position())
             if arrived and self.phase is SearchPhase.COME:
                 self.enter(SearchPhase.HOLD)
             self._call_teammates()
@@ -209,11 +209,11 @@ class CooperativeSearch(TeamFlight):
         assert self.claim is not None
         self.fly_to(self._look_from)
         if len(self._looks) >= _LOOKS:
-            place = np.median(self._looks, axis=0)
-            self.claim = self.claim._replace(place=_plain(place))
+            position = np.median(self._looks, axis=0)
+            self.claim = self.claim._replace(position=_plain(position))
             self.calls = RescueCalls.of(self.mates)
             stamp = header(self.claim.stamp_ns, "map")
-            self._found.publish(PointStamped(stamp, Point(*self.claim.place)))
+            self._found.publish(PointStamped(stamp, Point(*self.claim.position)))
             self._begin_to_come()
         elif self.phase_s > self._look_s:
             self.claim = None
@@ -227,10 +227,10 @@ class CooperativeSearch(TeamFlight):
     def _spread(self) -> tuple[int, float, Any]:
         return len(self.settings.team), self.settings.separation_m, self._inner
 
-    def _own_place(self) -> Array:
+    def _own_search_position(self) -> Array:
         assert self.claim is not None
-        places = places_around(np.array(self.claim.place), *self._spread)
-        return self.in_layer(places[self.settings.rank])
+        positions = positions_around(np.array(self.claim.position), *self._spread)
+        return self.in_layer(positions[self.settings.rank])
 
     def _hold(self) -> None:
         """Ends the search once all called teammates have stayed for `hold_s`.
@@ -273,7 +273,7 @@ class CooperativeSearch(TeamFlight):
         name = self.settings.name
         if called.finder not in self.mates:
             return f"{called.finder or 'the caller'} is not in the team of {name}"
-        if not self.settings.area.holds(*called.place[:2]):
+        if not self.settings.area.holds(*called.position[:2]):
             return f"{name} does not leave its area"
         if self.phase not in CAN_COME or self._finishing:
             return f"{name} no longer takes part: {self.phase}"
@@ -298,6 +298,6 @@ class CooperativeSearch(TeamFlight):
                 self.enter(SearchPhase.DONE)
 
 
-def _plain(place: Array) -> tuple[float, float, float]:
-    x, y, z = map(float, place)
+def _plain(position: Array) -> tuple[float, float, float]:
+    x, y, z = map(float, position)
     return x, y, z

@@ -55,7 +55,7 @@ class GroundView:
         turn = rotations.matrix(rotations.from_rpy(*np.radians(mount_rpy_deg)))
         self._body_from_optical: Array = turn @ _BODY_FROM_OPTICAL
 
-    def place_of(self, u: float, v: float, pose: OdometrySample, plane_z: float) -> Array | None:
+    def position_of(self, u: float, v: float, pose: OdometrySample, plane_z: float) -> Array | None:
         """Returns the intersection (3,) of a pixel's ray with the plane at `plane_z`, map frame.
 
         Returns None if the ray points up, or down by less than 10 degrees. An object whose visible
@@ -67,17 +67,17 @@ class GroundView:
         if ray[2] > -_STEEP * norm(ray):
             return None
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
-        place: Array = eye + (plane_z - eye[2]) / ray[2] * ray
-        return place if eye[2] > plane_z else None
+        position: Array = eye + (plane_z - eye[2]) / ray[2] * ray
+        return position if eye[2] > plane_z else None
 
     def disc_of(
-        self, place: Array, radius_m: float, pose: OdometrySample
+        self, position: Array, radius_m: float, pose: OdometrySample
     ) -> tuple[float, float, float] | None:
-        """Returns the image disc (column, row, radius; pixels) of a ball at `place` (3,) m.
+        """Returns the image disc (column, row, radius; pixels) of a ball at `position` (3,) m.
 
         Returns None if the ball is behind the camera.
         """
-        body = rotations.rotate(rotations.conjugate(pose.attitude), place - pose.position)
+        body = rotations.rotate(rotations.conjugate(pose.attitude), position - pose.position)
         x, y, z = self._body_from_optical.T @ (body - self._mount)
         if z < _NEAR_M:
             return None

@@ -17,7 +17,7 @@ _TEAMMATE_M = 0.7
 """Radius of the ball around a teammate, which may have the colour too. Modelling choice."""
 
 
-def place_seen(
+def object_position(
     image: Image,
     intrinsics: Intrinsics,
     settings: SearchSettings,
@@ -31,11 +31,13 @@ def place_seen(
     """
     pose = pose_at(pose, stamp_of(image))
     view = GroundView(intrinsics, settings.mount_m, settings.mount_rpy_deg)
-    discs = [view.disc_of(place, _TEAMMATE_M, pose) for place in teammates]
+    discs = [view.disc_of(position, _TEAMMATE_M, pose) for position in teammates]
     hidden = [disc for disc in discs if disc is not None]
     mask = colour_mask(pixels_of(image), settings.colours, np.array(hidden) if hidden else NO_DISCS)
     blob = largest_blob(mask)
-    if blob is None or blob.share < settings.min_fraction:
+    if blob is None or blob.fraction < settings.min_fraction:
         return None
-    place = view.place_of(blob.u, blob.v, pose, settings.object_height_m)
-    return place if place is not None and settings.area.holds(place[0], place[1]) else None
+    position = view.position_of(blob.u, blob.v, pose, settings.object_height_m)
+    return (
+        position if position is not None and settings.area.holds(position[0], position[1]) else None
+    )

@@ -48,14 +48,14 @@ def random_waypoint(area: Area, key: np.uint64, number: int) -> Array:
     )
 
 
-def places_around(place: Array, count: int, separation_m: float, area: Area) -> Array:
-    """Returns positions (count, 2) in the area, `separation_m` or more from each other and `place`.
+def positions_around(position: Array, count: int, separation_m: float, area: Area) -> Array:
+    """Returns positions (count, 2) in the area, `separation_m` apart and from `position`.
 
-    They lie on rings around `place` (2,), the nearest ones first, and depend on the arguments only.
-    A `place` outside of the area is moved to its border. Raises GraphError if there is no room;
-    `check_room` checks this for all positions of an area.
+    They lie on rings around `position` (2,), the nearest ones first, and depend on the arguments
+    only. A `position` outside of the area is moved to its border. Raises GraphError if there is no
+    room; `check_room` checks this for all positions of an area.
     """
-    middle = np.clip(place[:2], area[:2], area[2:])
+    middle = np.clip(position[:2], area[:2], area[2:])
     found: list[Array] = []
     widest = math.hypot(area.x_max - area.x_min, area.y_max - area.y_min)
     for ring in range(1, math.ceil(widest / separation_m) + 1):
@@ -71,7 +71,7 @@ def places_around(place: Array, count: int, separation_m: float, area: Area) -> 
 
 
 def check_room(count: int, separation_m: float, area: Area) -> None:
-    """Raises GraphError unless `places_around` finds room around every position of the area.
+    """Raises GraphError unless `search_positions` finds room around every position of the area.
 
     Each position has a quarter circle with a radius of half the shorter side in the area; on it
     every ring k but the first has at least 1.5 k positions.
@@ -80,11 +80,11 @@ def check_room(count: int, separation_m: float, area: Area) -> None:
     while sure < count:
         rings += 1
         sure += 3 * rings // 2
-    least = 2.0 * rings * separation_m
-    if min(area.x_max - area.x_min, area.y_max - area.y_min) < least:
+    min_side = 2.0 * rings * separation_m
+    if min(area.x_max - area.x_min, area.y_max - area.y_min) < min_side:
         raise GraphError(
             f"search: {counted(count, 'UAV')} {separation_m} m apart need an area of "
-            f"{least:g} m a side at least, without its borders, not {list(area)} m"
+            f"{min_side:g} m a side at least, without its borders, not {list(area)} m"
         )
 
 

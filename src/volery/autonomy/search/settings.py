@@ -55,11 +55,11 @@ class SearchSettings:
     def declare(cls, node: Node) -> SearchSettings:
         """Declares and reads the parameters of a node. Raises GraphError for invalid values."""
 
-        def number(name: str, default: float, least: float = -math.inf) -> float:
+        def number(name: str, default: float, minimum: float = -math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
-            if not (math.isfinite(value) and value >= least):
+            if not (math.isfinite(value) and value >= minimum):
                 raise GraphError(
-                    f"search: {name} must be a number of at least {least:g}, not {value}"
+                    f"search: {name} must be a number of at least {minimum:g}, not {value}"
                 )
             return value
 
@@ -74,7 +74,7 @@ class SearchSettings:
         if name not in team or len(set(team)) != len(team):
             raise GraphError(f"search: team must contain '{name}', and each UAV once, not {team}")
         first_hue, last_hue = numbers("hue_deg", ColourRange()[:2])
-        least = number("min_saturation", 0.5, 0.0), number("min_value", 0.2, 0.0)
+        minimums = number("min_saturation", 0.5, 0.0), number("min_value", 0.2, 0.0)
         return cls(
             name=name,
             team=team,
@@ -87,7 +87,7 @@ class SearchSettings:
             mount_m=numbers("mount_m", (0.0, 0.0, 0.0)),
             mount_rpy_deg=numbers("mount_rpy_deg", (0.0, 90.0, 0.0)),
             object_height_m=number("object_height_m", 0.5, 0.01),
-            colours=ColourRange(first_hue, last_hue, *least),
+            colours=ColourRange(first_hue, last_hue, *minimums),
             min_fraction=number("min_fraction", 0.001, 0.0),
             gather_s=number("gather_s", 20.0, 0.0),
             timeout_s=number("timeout_s", 5.0, 0.0),

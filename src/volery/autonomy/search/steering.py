@@ -15,9 +15,9 @@ _CLIMB_GAIN_PER_S, _CLIMB_M_S = 1.2, 1.0
 """All modelling choices: gentle enough for every shipped airframe."""
 
 
-def towards(pose: OdometrySample, place: Array, speed_m_s: float) -> Twist:
-    """Returns the command that flies to `place` (3,) m at constant heading and can still brake."""
-    offset = place - pose.position
+def towards(pose: OdometrySample, position: Array, speed_m_s: float) -> Twist:
+    """Returns the command that flies to `position` (3,) m, at constant heading, and can brake."""
+    offset = position - pose.position
     away = math.hypot(offset[0], offset[1])
     speed = min(speed_m_s, _GAIN_PER_S * away, math.sqrt(2.0 * _BRAKE_M_S2 * away))
     ahead = offset[:2] / max(away, 1e-9) * speed
@@ -29,7 +29,7 @@ def towards(pose: OdometrySample, place: Array, speed_m_s: float) -> Twist:
     return Twist(linear, Vector3(0.0, 0.0, 0.0))
 
 
-def is_at(pose: OdometrySample, place: Array, within_m: float, still_m_s: float) -> bool:
+def is_at(pose: OdometrySample, position: Array, within_m: float, still_m_s: float) -> bool:
     """Returns whether a UAV is within `within_m` of a position and slower than `still_m_s`."""
-    away = norm(place - pose.position)
+    away = norm(position - pose.position)
     return away <= within_m and norm(pose.velocity) <= still_m_s

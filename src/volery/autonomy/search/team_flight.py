@@ -113,15 +113,15 @@ class TeamFlight(SavedAttributes, Node):
         self.phase, self._since_ns = phase, self.now_ns
         self._publish_state()
 
-    def in_layer(self, place: Array) -> Array:
-        """Returns the position (3,) over or under `place`, at this UAV's own height."""
-        return np.array([place[0], place[1], self.settings.layer_z])
+    def in_layer(self, position: Array) -> Array:
+        """Returns the position (3,) over or under `position`, at this UAV's own height."""
+        return np.array([position[0], position[1], self.settings.layer_z])
 
-    def fly_to(self, place: Array, within_m: float = _ARRIVED_M) -> bool:
-        """Publishes a command towards `place` (3,) m; returns whether the UAV hovers there."""
+    def fly_to(self, position: Array, within_m: float = _ARRIVED_M) -> bool:
+        """Publishes a command towards `position` (3,) m; returns whether the UAV hovers there."""
         assert self.pose is not None
-        self._command.publish(towards(self.pose, place, self.settings.speed_m_s))
-        return is_at(self.pose, place, within_m, _ARRIVED_M_S)
+        self._command.publish(towards(self.pose, position, self.settings.speed_m_s))
+        return is_at(self.pose, position, within_m, _ARRIVED_M_S)
 
     def team_in(self, phases: frozenset[SearchPhase]) -> bool:
         """Returns whether a teammate with recent messages is in one of these phases."""
@@ -163,9 +163,9 @@ class TeamFlight(SavedAttributes, Node):
         return on_state
 
     def _publish_state(self) -> None:
-        place = np.zeros(3) if self.pose is None else self.pose.position
+        position = np.zeros(3) if self.pose is None else self.pose.position
         self._state.publish(
-            self._state_type(header(self.now_ns, "map"), str(self.phase), Point(*place.tolist()))
+            self._state_type(header(self.now_ns, "map"), str(self.phase), Point(*position.tolist()))
         )
 
     # ------------------------------------------------------------------------------------ behaviour

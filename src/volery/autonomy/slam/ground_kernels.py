@@ -18,7 +18,7 @@ Keys = NDArray[np.int64]
 
 GROUND_CELL_M = 1.0
 GROUND_CELLS = 192
-MOST = 40.0
+MAX_RETURNS = 40.0
 """Returns of a cell after which its sums stay constant."""
 _RIDGE = 0.3
 """m^2: weight of the expected slope in a plane fit."""
@@ -39,7 +39,7 @@ def add_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> None:
     if keys[a, b] != key:
         keys[a, b] = key
         cell[:] = 0.0
-    if cell[0] >= MOST:
+    if cell[0] >= MAX_RETURNS:
         return
     cell[0] += 1.0
     cell[1] += x

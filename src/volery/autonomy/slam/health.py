@@ -60,7 +60,7 @@ class SlamHealth(SavedAttributes):
             return tracker.recovery.has_failed(tracker.covariance, now)
         fresh = [m for m in tracker.match.values() if now - m.time_ns < NS_PER_S // 2]
         met = sum(m.met for m in fresh)
-        few = met < _FEW and not tracker.is_standing
+        few = met < _FEW and not tracker.is_stationary
         self._scarce_ns = (self._scarce_ns or now) if few else None
         seen, usual = sum(m.seen for m in fresh), sum(m.usual * m.seen for m in fresh)
         unfit = seen >= MANY and met < MISFIT * usual

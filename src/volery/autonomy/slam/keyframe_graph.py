@@ -57,7 +57,7 @@ class KeyframeGraph(SavedAttributes):
 
     STATE = (
         "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
-        "relocation", "_gathering", "_tried", "_settling",
+        "relocalization", "_gathering", "_tried", "_settling",
     )  # fmt: skip
 
     def __init__(self, matching: ScanMatching, start: Array, has_loops: bool = True) -> None:
@@ -76,7 +76,7 @@ class KeyframeGraph(SavedAttributes):
         self.is_placed = True
         """Whether the current session's pose in the map is known."""
         self.correction = KeyframePose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
-        self.relocation = Relocalization()
+        self.relocalization = Relocalization()
         self._gathering = KeyframeBuilder()
         self._tried = -1_000
 
@@ -87,13 +87,13 @@ class KeyframeGraph(SavedAttributes):
         if not self._is_due(tracker):
             return False
         state = tracker.state
-        place = state[:3].copy(), state[Q : Q + 4].copy(), state[G : G + 3].copy()
-        frame = self._gathering.keyframe(tracker.time_ns, place, tracker.travelled_m, self.session)
+        pose = state[:3].copy(), state[Q : Q + 4].copy(), state[G : G + 3].copy()
+        frame = self._gathering.keyframe(tracker.time_ns, pose, tracker.travelled_m, self.session)
         if not self.frames:
             self._settling = tracker.settling.copy()
-        self._append(frame, place[2])
-        self._look_for_known_places()
-        self._correct(place[2])
+        self._append(frame, pose[2])
+        self._look_for_loop_closures()
+        self._correct(pose[2])
         return True
 
     def restart(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
@@ -112,7 +112,7 @@ class KeyframeGraph(SavedAttributes):
         hint = None
         if moved is not None and self.is_placed:
             hint = rotations.rotate(self.correction.attitude, np.array([*moved, 0.0]))[:2]
-        self.relocation.begin(doubted, hint)
+        self.relocalization.begin(doubted, hint)
         self.session += 1
         self.is_placed = False
         self._gathering = KeyframeBuilder()
@@ -137,8 +137,8 @@ class KeyframeGraph(SavedAttributes):
                 known = max(
                     known, self.frames[edge.to].travelled_m - self.frames[edge.origin].travelled_m
                 )
-        way = max(tracker.travelled_m - known, 0.0)
-        return np.hypot(_PER_ROOT_M * math.sqrt(way), [0.02, 0.02, 0.02, 0.001])
+        travelled_m = max(tracker.travelled_m - known, 0.0)
+        return np.hypot(_PER_ROOT_M * math.sqrt(travelled_m), [0.02, 0.02, 0.02, 0.001])
 
     # -------------------------------------------------------------------------------- keyframes
 
@@ -199,14 +199,14 @@ class KeyframeGraph(SavedAttributes):
 
     # ---------------------------------------------------------------------------- loop closures
 
-    def _look_for_known_places(self) -> None:
+    def _look_for_loop_closures(self) -> None:
         if self._closer is None:
             return
         newest = len(self.frames) - 1
         if self.is_placed:
             found = self._find_near(newest)
         else:
-            found = self.relocation.find(self._closer, self.frames, self.poses)
+            found = self.relocalization.find(self._closer, self.frames, self.poses)
         if found is None:
             return
         self.edges.append(found)
@@ -224,7 +224,7 @@ class KeyframeGraph(SavedAttributes):
         for k in range(newest):
             if here.travelled_m - self.frames[k].travelled_m < _APART_M:
                 break
-            if k in self.relocation.doubted:
+            if k in self.relocalization.doubted:
                 continue
             away = float(np.hypot(*(self.poses[k] - self.poses[newest])[:2]))
             if away < best:
@@ -232,10 +232,10 @@ class KeyframeGraph(SavedAttributes):
         if row < 0:
             return None
         self._tried = newest
-        way = here.travelled_m - self.frames[row].travelled_m
-        drift = 3.0 * _PER_ROOT_M * math.sqrt(way)
-        reach = (0.4 + float(drift[0]), 0.01 + float(drift[3]))
-        found = self._closer.match(self.frames, self.poses, newest, row, reach)
+        travelled_m = here.travelled_m - self.frames[row].travelled_m
+        drift = 3.0 * _PER_ROOT_M * math.sqrt(travelled_m)
+        window = (0.4 + float(drift[0]), 0.01 + float(drift[3]))
+        found = self._closer.match(self.frames, self.poses, newest, row, window)
         if found is None:
             self.refused += 1
             return None

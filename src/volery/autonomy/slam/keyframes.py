@@ -13,7 +13,7 @@ from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.vectors import norm
 
-_MOST_POINTS = {UPRIGHT: 400, GROUND: 150}
+_MAX_POINTS = {UPRIGHT: 400, GROUND: 150}
 
 
 class Keyframe(NamedTuple):
@@ -103,7 +103,7 @@ class KeyframeBuilder:
         level = level_of(gravity, attitude)
         points = np.concatenate([*self._points, np.zeros((0, 3))])
         kinds = np.concatenate([*self._kinds, np.zeros(0, np.int8)])
-        chosen = np.concatenate([_spread(kinds, kind) for kind in _MOST_POINTS])
+        chosen = np.concatenate([_spread(kinds, kind) for kind in _MAX_POINTS])
         turn = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
         own = rotations.rotate(turn, points[chosen] - position)
         self._points, self._kinds = [], []
@@ -115,7 +115,7 @@ class KeyframeBuilder:
 def _spread(kinds: NDArray[np.int8], kind: int) -> NDArray[np.int64]:
     """Returns rows of a kind, thinned evenly."""
     rows = np.flatnonzero(kinds == kind)
-    most = _MOST_POINTS[kind]
-    if len(rows) <= most:
+    max_points = _MAX_POINTS[kind]
+    if len(rows) <= max_points:
         return rows
-    return rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)]
+    return rows[np.linspace(0, len(rows) - 1, max_points).round().astype(np.int64)]

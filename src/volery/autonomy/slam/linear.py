@@ -39,11 +39,11 @@ def eliminate(matrix: Array, right: Array) -> bool:
         _swap(matrix, j, pivot)
         _swap(right, j, pivot)
         for i in range(j + 1, n):
-            share = matrix[i, j] / matrix[j, j]
+            factor = matrix[i, j] / matrix[j, j]
             for k in range(j, n):
-                matrix[i, k] -= share * matrix[j, k]
+                matrix[i, k] -= factor * matrix[j, k]
             for k in range(m):
-                right[i, k] -= share * right[j, k]
+                right[i, k] -= factor * right[j, k]
     for i in range(n - 1, -1, -1):
         for k in range(m):
             rest = right[i, k]

@@ -17,14 +17,14 @@ from volery.autonomy.slam.relocalization_kernels import draw, draw_maps, refine,
 from volery.autonomy.slam.settings import ScanMatching
 from volery.core.arrays import Array
 
-_PICTURE = 400
+_IMAGE_SIDE = 400
 _ROUNDS = 8
 _BEFORE, AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
-_LEAST_SHARE, _LEAST_MET = 0.42, 30.0
+_MIN_FRACTION, _MIN_MATCHES = 0.42, 30.0
 """Min fraction and number of matched uprights, weighted by how well they fit."""
-_LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.2, 80.0
-_LEAST_MARGIN_LOST = 0.05
+_MIN_FRACTION_LOST, _MIN_MATCHES_LOST = 0.2, 80.0
+_MIN_MARGIN_LOST = 0.05
 """Margin by which the found position must fit better than all others.
 
 Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, pairs that
@@ -34,7 +34,7 @@ fractions of up to 0.39, in a thicket.
 """
 _APART_M = 1.5
 """Distance from the best position beyond which a position is another one."""
-_LEAST_INFORMATION = 2000.0
+_MIN_INFORMATION = 2000.0
 """1/m^2, min information on the position in the weakest direction: that of three trunks, hit ten
 times each.
 """
@@ -46,7 +46,7 @@ class LoopClosure(NamedTuple):
     """A loop closure and its quality."""
 
     edge: PoseGraphEdge
-    share: float
+    fraction: float
     met: float
     margin: float
     """Margin over every other position that was tried."""
@@ -80,7 +80,7 @@ class LoopCloser:
     def __init__(self, matching: ScanMatching) -> None:
         self._matching = matching
         self._maps = Submaps.empty()
-        self._image = np.zeros((_PICTURE, _PICTURE), np.uint8)
+        self._image = np.zeros((_IMAGE_SIDE, _IMAGE_SIDE), np.uint8)
 
     def match(
         self,
@@ -88,21 +88,25 @@ class LoopCloser:
         poses: Sequence[Array],
         newest: int,
         older: int,
-        reach: tuple[float, float],
+        window: tuple[float, float],
     ) -> LoopClosure | None:
         """Returns the newest keyframe relative to an older one; None if they do not fit.
 
-        `reach`: max error of the newest one's estimated pose, m and rad.
+        `window`: max error of the newest one's estimated pose, m and rad.
         """
         pair = _pair(frames, poses, newest, older)
         if pair is None:
             return None
-        guess = between(poses[older], poses[newest])
-        span = np.array([reach[0], reach[0], reach[1]])
-        found, margin = self._searched(pair, guess[[0, 1, 3]], span, _NEARBY)
-        pose = np.array([found[0], found[1], guess[2], found[2]])
+        predicted = between(poses[older], poses[newest])
+        span = np.array([window[0], window[0], window[1]])
+        found, margin = self._searched(pair, predicted[[0, 1, 3]], span, _NEARBY)
+        pose = np.array([found[0], found[1], predicted[2], found[2]])
         closure = self._refined(pose, pair, (older, newest), margin)
-        fits = closure is not None and closure.share >= _LEAST_SHARE and closure.met >= _LEAST_MET
+        fits = (
+            closure is not None
+            and closure.fraction >= _MIN_FRACTION
+            and closure.met >= _MIN_MATCHES
+        )
         return closure if fits else None
 
     def find(
@@ -111,27 +115,27 @@ class LoopCloser:
         poses: Sequence[Array],
         newest: int,
         older: int,
-        reach: tuple[float, float],
+        window: tuple[float, float],
     ) -> LoopClosure | None:
         """Returns a hypothesis for a lost vehicle's newest keyframe relative to an older one.
 
-        `reach`: max distance from the older one, m, and from the estimated heading, rad. None if no
-        pose fits.
+        `window`: max distance from the older one, m, and from the estimated heading, rad. None if
+        no pose fits.
         """
         pair = _pair(frames, poses, newest, older)
         if pair is None:
             return None
         seems = np.array([0.0, 0.0, between(poses[older], poses[newest])[3]])
-        span = np.array([reach[0], reach[0], reach[1]])
-        trial = _ANY_HEADING if reach[1] >= math.pi else _ANYWHERE
+        span = np.array([window[0], window[0], window[1]])
+        trial = _ANY_HEADING if window[1] >= math.pi else _ANYWHERE
         found, margin = self._searched(pair, seems, span, trial)
         pose = np.array([found[0], found[1], _height(pair), found[2]])
         closure = self._refined(pose, pair, (older, newest), margin)
         fits = (
             closure is not None
-            and closure.share >= _LEAST_SHARE_LOST
-            and closure.met >= _LEAST_MET_LOST
-            and margin >= _LEAST_MARGIN_LOST
+            and closure.fraction >= _MIN_FRACTION_LOST
+            and closure.met >= _MIN_MATCHES_LOST
+            and margin >= _MIN_MARGIN_LOST
         )
         return closure if fits else None
 
@@ -139,17 +143,19 @@ class LoopCloser:
         self, pair: _Pair, middle: Array, span: Array, trial: _Trial
     ) -> tuple[Array, float]:
         """Returns the best pose (3,) x, y, yaw, and its margin over any other position."""
-        standing = pair.query[pair.query_kinds == UPRIGHT]
+        uprights = pair.query[pair.query_kinds == UPRIGHT]
         known = pair.known[pair.known_kinds == UPRIGHT]
         draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._image)
-        thin = np.ascontiguousarray(standing[:: max(len(standing) // trial.returns, 1), :2])
+        thin = np.ascontiguousarray(uprights[:: max(len(uprights) // trial.returns, 1), :2])
         side = 2 * math.ceil(span[0] / trial.cell_m) + 1
-        found, shares = np.zeros(3), np.empty((side, side))
-        best = search(thin, self._image, trial.cell_m, middle, span, trial.step_rad, found, shares)
-        rows, columns = np.indices(shares.shape)
-        row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        found, fractions = np.zeros(3), np.empty((side, side))
+        best = search(
+            thin, self._image, trial.cell_m, middle, span, trial.step_rad, found, fractions
+        )
+        rows, columns = np.indices(fractions.shape)
+        row, column = np.unravel_index(int(np.argmax(fractions)), fractions.shape)
         away = trial.cell_m * np.hypot(rows - row, columns - column) > _APART_M
-        return found, best - float(shares[away].max(initial=0.0))
+        return found, best - float(fractions[away].max(initial=0.0))
 
     def _refined(
         self, pose: Array, pair: _Pair, rows: tuple[int, int], margin: float
@@ -162,7 +168,7 @@ class LoopCloser:
             m.upright_sigma_m**2, m.ground_sigma_m**2, _ROUNDS, information, sums,
         )  # fmt: skip
         weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
-        if not done or weakest < _LEAST_INFORMATION:
+        if not done or weakest < _MIN_INFORMATION:
             return None
         spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
         sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
@@ -178,7 +184,7 @@ def _pair(
 ) -> _Pair | None:
     """Returns the newest keyframes and those around an older one; None for too few returns."""
     query = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
-    if np.count_nonzero(query[1] == UPRIGHT) < _LEAST_MET:
+    if np.count_nonzero(query[1] == UPRIGHT) < _MIN_MATCHES:
         return None
     others = range(older - AROUND, min(older + AROUND + 1, newest - _BEFORE))
     return _Pair(*query, *_around(frames, poses, older, others))

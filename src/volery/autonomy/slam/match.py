@@ -46,6 +46,6 @@ def judged(sums: Array, before: Match | None, time_ns: int) -> Match:
         found.usual = before.usual
         if found.seen >= MANY and found.fits:
             passed = (time_ns - before.time_ns) / NS_PER_S
-            share = found.met / found.seen
-            found.usual += min(passed / _USUAL_S, 1.0) * (share - found.usual)
+            fraction = found.met / found.seen
+            found.usual += min(passed / _USUAL_S, 1.0) * (fraction - found.usual)
     return found

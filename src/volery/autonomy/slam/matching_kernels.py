@@ -172,7 +172,7 @@ def gather(
 
 
 @inner_kernel
-def _place_of(i: int) -> int:
+def _state_index(i: int) -> int:
     """Returns the row among the 17 errors of one of the six of the pose."""
     return i if i < 3 else i + 3
 
@@ -220,17 +220,19 @@ def update(
         for i in range(6):
             right[i, 0] = -trust * gradient[i]
             for k in range(6):
-                right[i, 0] += trust * information[i, k] * error[_place_of(k)]
+                right[i, 0] += trust * information[i, k] * error[_state_index(k)]
                 left[i, k] = 1.0 if i == k else 0.0
                 for j in range(6):
-                    left[i, k] += trust * information[i, j] * covariance[_place_of(j), _place_of(k)]
+                    left[i, k] += (
+                        trust * information[i, j] * covariance[_state_index(j), _state_index(k)]
+                    )
         if not eliminate(left, right):
             _copy(prior, state)
             return False
         for i in range(STATES):
             error[i] = 0.0
             for k in range(6):
-                error[i] += covariance[i, _place_of(k)] * right[k, 0]
+                error[i] += covariance[i, _state_index(k)] * right[k, 0]
         _copy(prior, state)
         add_error(state, error)
     return _shrink(covariance, information, trust)
@@ -244,18 +246,20 @@ def _shrink(covariance: Array, information: Array, trust: float) -> bool:
         for k in range(6):
             left[i, k] = 1.0 if i == k else 0.0
             for j in range(6):
-                left[i, k] += trust * information[i, j] * covariance[_place_of(j), _place_of(k)]
+                left[i, k] += (
+                    trust * information[i, j] * covariance[_state_index(j), _state_index(k)]
+                )
         for k in range(STATES):
             right[i, k] = 0.0
             for j in range(6):
-                right[i, k] += trust * information[i, j] * covariance[_place_of(j), k]
+                right[i, k] += trust * information[i, j] * covariance[_state_index(j), k]
     if not eliminate(left, right):
         return False
     less = np.zeros((STATES, STATES))
     for i in range(STATES):
         for k in range(STATES):
             for j in range(6):
-                less[i, k] += covariance[i, _place_of(j)] * right[j, k]
+                less[i, k] += covariance[i, _state_index(j)] * right[j, k]
     for i in range(STATES):
         for k in range(i + 1):
             covariance[i, k] -= 0.5 * (less[i, k] + less[k, i])

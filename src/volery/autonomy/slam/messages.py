@@ -89,6 +89,6 @@ def path(time_ns: int, times_ns: Sequence[int], poses: Sequence[Array]) -> PathM
     stamped = []
     for when, (x, y, z, yaw) in zip(times_ns, poses, strict=True):
         turn = Quaternion(0.0, 0.0, math.sin(0.5 * float(yaw)), math.cos(0.5 * float(yaw)))
-        place = Point(float(x), float(y), float(z))
-        stamped.append(PoseStamped(header(when, "map"), Pose(place, turn)))
+        point = Point(float(x), float(y), float(z))
+        stamped.append(PoseStamped(header(when, "map"), Pose(point, turn)))
     return PathMessage(header(time_ns, "map"), stamped)

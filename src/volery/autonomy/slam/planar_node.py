@@ -87,7 +87,7 @@ class PlanarSlam(SavedAttributes, Node):
             self._mount = Mount(np.array(mount[:3]), turn)
         kept = ReturnSettings(
             nearest_m=float(self.declare_parameter("min_range_m", 0.05, min_value=0.0).value),
-            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value),
+            max_range_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value),
         )
         self._settings = PlanarSettings(returns=kept)
         self._uses_odometry = bool(self.declare_parameter("use_odometry", True).value)
@@ -180,11 +180,11 @@ class PlanarSlam(SavedAttributes, Node):
         if follower.is_lost:
             follower.restart()
         if self._keyframe_graph.frames:
-            self._publish_place(time_ns)
+            self._publish_map_from_odom(time_ns)
 
     # ---------------------------------------------------------------------------------- publishers
 
-    def _publish_place(self, time_ns: int) -> None:
+    def _publish_map_from_odom(self, time_ns: int) -> None:
         motion = self._follower.motion
         pose, velocity = motion.pose, motion.velocity
         state = (
@@ -208,8 +208,8 @@ class PlanarSlam(SavedAttributes, Node):
         self._pose.publish(messages.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
         at = self._keyframe_graph.correction
         turn = rotations.from_rpy(0.0, 0.0, float(at[2]))
-        place = np.array([at[0], at[1], z])
-        self._tf.publish(messages.map_from_odom(time_ns, self._uav, place, turn))
+        position = np.array([at[0], at[1], z])
+        self._tf.publish(messages.map_from_odom(time_ns, self._uav, position, turn))
 
     def _publish_status(self) -> None:
         follower, graph = self._follower, self._keyframe_graph
@@ -224,7 +224,7 @@ class PlanarSlam(SavedAttributes, Node):
         status = {
             "state": state,
             "problems": problems,
-            "share": round(follower.share, 2),
+            "share": round(follower.fraction, 2),
             "sigma_m": round(sigma, 3),
             "keyframes": len(graph.frames),
             "closures": graph.closures,

@@ -9,7 +9,7 @@ import numpy as np
 from volery.autonomy.slam.inertial_kernels import BA, BG, STATES, G, P, Q, V, move, observe
 from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.matching_kernels import carry_along
-from volery.autonomy.slam.recovery_kernels import find_attitude, find_place
+from volery.autonomy.slam.recovery_kernels import find_attitude, find_position
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
@@ -25,13 +25,13 @@ choices).
 """
 _UNSURE_RAD = 0.05
 """Tilt uncertainty above which ground returns would be classified as upright."""
-_TRIED_RAD, _TRIED, _ATTITUDE_SHARE = 0.6, 400, 0.75
+_TRIED_RAD, _TRIED, _ATTITUDE_FRACTION = 0.6, 400, 0.75
 """Max rotation that is tried, number of returns, and fraction of them that must fit."""
 _FOUND_RAD, _FOUND_M = 0.03, 0.15
 """Standard deviations of the recovered pose."""
-_LEAST_M, _MOST_M, _LEAST_RAD, _MOST_RAD = 0.5, 3.0, 0.2, 0.8
+_MIN_M, _MAX_M, _MIN_RAD, _MAX_RAD = 0.5, 3.0, 0.2, 0.8
 """Bounds of the search window of three standard deviations."""
-_PLACE_SHARE, _ELSEWHERE = 0.35, 0.75
+_POSITION_FRACTION, _ELSEWHERE = 0.35, 0.75
 """Min fraction of matched uprights, and max fraction elsewhere, relative to it."""
 _LONG_NS = NS_PER_S
 _USUAL_M_S, _USUAL_EACH_NS = 2.5, NS_PER_S // 2
@@ -118,10 +118,10 @@ class Recovery:
         tried = state.copy()
         if self.is_aslant(covariance):
             few = np.ascontiguousarray(body[:: max(len(body) // _TRIED, 1)])
-            share = find_attitude(tried, few, maps, _TRIED_RAD)
-            if share < _ATTITUDE_SHARE:
+            fraction = find_attitude(tried, few, maps, _TRIED_RAD)
+            if fraction < _ATTITUDE_FRACTION:
                 return False
-        if not _find_place(tried, covariance, maps, body):
+        if not _find_position(tried, covariance, maps, body):
             return False
         was = state.copy()
         state[:] = tried
@@ -133,17 +133,17 @@ class Recovery:
         return True
 
 
-def _find_place(state: Array, covariance: Array, maps: Submaps, body: Array) -> bool:
+def _find_position(state: Array, covariance: Array, maps: Submaps, body: Array) -> bool:
     """Moves `state` to the best match of the uprights; returns whether it is unique."""
     spread = 3.0 * math.sqrt(float(max(covariance[0, 0], covariance[1, 1])))
     turn = 3.0 * math.sqrt(float(covariance[8, 8]))
     found = np.zeros(5)
-    find_place(
+    find_position(
         rotations.rotate(state[Q : Q + 4], body) + state[:3],
         state[P : P + 3].copy(), maps,
-        min(max(spread, _LEAST_M), _MOST_M), min(max(turn, _LEAST_RAD), _MOST_RAD), found,
+        min(max(spread, _MIN_M), _MAX_M), min(max(turn, _MIN_RAD), _MAX_RAD), found,
     )  # fmt: skip
-    if found[3] < _PLACE_SHARE or found[4] > _ELSEWHERE * found[3]:
+    if found[3] < _POSITION_FRACTION or found[4] > _ELSEWHERE * found[3]:
         return False
     state[P : P + 2] += found[:2]
     around = rotations.from_rpy(0.0, 0.0, float(found[2]))

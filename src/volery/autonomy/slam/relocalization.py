@@ -14,7 +14,7 @@ from volery.autonomy.slam.loop_closure import AROUND, LoopCloser
 from volery.autonomy.slam.pose_graph import PoseGraphEdge, between, compose
 from volery.core.arrays import Array
 
-_REACH_M, _TURN_RAD = 12.0, 0.2
+_WINDOW_M, _TURN_RAD = 12.0, 0.2
 """Max distance to an old keyframe, and from the gyroscope's heading; after all keyframes have been
 tried so, any heading is tried.
 """
@@ -82,10 +82,10 @@ class Relocalization:
             row = old[self._cursor % len(old)]
             turn = _TURN_RAD if self._cursor < len(old) else math.pi
             self._cursor += 1
-            found = closer.find(frames, poses, newest, row, (_REACH_M, turn))
+            found = closer.find(frames, poses, newest, row, (_WINDOW_M, turn))
             if found is not None:
-                place = compose(poses[row], found.edge.measured)
-                moved = compose(place, between(poses[newest], np.zeros(4)))
+                pose = compose(poses[row], found.edge.measured)
+                moved = compose(pose, between(poses[newest], np.zeros(4)))
                 self._hypotheses.append(PoseHypothesis(found.edge, found.margin, moved))
         return chosen(self._hypotheses, newest, poses[newest], self._hint)
 
@@ -99,15 +99,15 @@ def chosen(
     """
     if not hypotheses:
         return None
-    places = np.array([compose(guess.moved, pose) for guess in hypotheses])
-    same = _within(places[:, None], places, _SAME)
+    poses = np.array([compose(hypothesis.moved, pose) for hypothesis in hypotheses])
+    same = _within(poses[:, None], poses, _SAME)
     weights = np.array(
         [_weight([hypotheses[k] for k in np.flatnonzero(row).tolist()]) for row in same]
     )
     if hint is not None:
-        weights += _HINTED * _within(places, pose + np.append(hint, [0.0, 0.0]), _HINT)
+        weights += _HINTED * _within(poses, pose + np.append(hint, [0.0, 0.0]), _HINT)
     best = int(np.argmax(weights))
-    others = weights[~_within(places, places[best], _OTHER)]
+    others = weights[~_within(poses, poses[best], _OTHER)]
     fresh = [
         hypotheses[k]
         for k in np.flatnonzero(same[best]).tolist()

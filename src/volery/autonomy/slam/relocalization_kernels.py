@@ -16,14 +16,14 @@ from volery.autonomy.slam.upright_kernels import add_upright
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Picture = NDArray[np.uint8]
+OccupancyImage = NDArray[np.uint8]
 
 _FOUR = (0, 1, 2, 5)
 """Components of position and rotation that gravity does not determine."""
 
 
 @kernel
-def draw(points: Array, cell: float, image: Picture) -> None:
+def draw(points: Array, cell: float, image: OccupancyImage) -> None:
     """Marks the cells of points (K, 2), and their neighbours, in `image` (n, n) at the origin."""
     n = image.shape[0]
     image[:] = 0
@@ -39,7 +39,7 @@ def draw(points: Array, cell: float, image: Picture) -> None:
 
 
 @inner_kernel
-def _count_at(points: Array, x: float, y: float, cell: float, image: Picture) -> int:
+def _count_at(points: Array, x: float, y: float, cell: float, image: OccupancyImage) -> int:
     n, count = image.shape[0], 0
     for k in range(points.shape[0]):
         i = math.floor((points[k, 0] + x) / cell) + n // 2
@@ -50,22 +50,22 @@ def _count_at(points: Array, x: float, y: float, cell: float, image: Picture) ->
 
 
 @kernel
-def count_drawn(points: Array, cell: float, image: Picture) -> int:
+def count_drawn(points: Array, cell: float, image: OccupancyImage) -> int:
     """Returns how many of points (K, 2) lie in marked cells of a `image` around the origin."""
     return _count_at(points, 0.0, 0.0, cell, image)
 
 
 @kernel
-def shares_around(
+def fractions_around(
     one: Array,
-    image: Picture,
+    image: OccupancyImage,
     other: Array,
-    other_image: Picture,
+    other_image: OccupancyImage,
     cell: float,
     steps: Array,
-    shares: Array,
+    fractions: Array,
 ) -> None:
-    """Fills `shares` (K,): matched fraction after `one` (M, 2) moved by each of `steps` (K, 2).
+    """Fills `fractions` (K,): matched fraction after `one` (M, 2) moved by each of `steps` (K, 2).
 
     It is the mean of two: of points `one` in `image`, and of points `other` (N, 2), moved the
     opposite direction, in `other_image`, which shows `one`.
@@ -74,30 +74,30 @@ def shares_around(
         x, y = steps[k, 0], steps[k, 1]
         onwards = _count_at(one, x, y, cell, image) / one.shape[0]
         back = _count_at(other, -x, -y, cell, other_image) / other.shape[0]
-        shares[k] = 0.5 * (onwards + back)
+        fractions[k] = 0.5 * (onwards + back)
 
 
 @kernel
 def search(
     points: Array,
-    image: Picture,
+    image: OccupancyImage,
     cell: float,
     middle: Array,
-    reach: Array,
+    window: Array,
     step_rad: float,
     best: Array,
-    shares: Array,
+    fractions: Array,
 ) -> float:
     """Finds the pose (3,) x, y, yaw of points (K, 2) in `image` with the best score.
 
-    It tries `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`; `shares` gets the
-    scores of all positions, each at its best heading. Returns the best score, 0 to 1.
+    It tries `middle` (3,) +- `window` (3,), in steps of a cell and of `step_rad`; `fractions` gets
+    the scores of all positions, each at its best heading. Returns the best score, 0 to 1.
     """
     n, count = image.shape[0], points.shape[0]
-    wide, high = math.ceil(reach[0] / cell), math.ceil(reach[1] / cell)
-    turns = math.ceil(reach[2] / step_rad)
-    shares[:] = 0.0
-    most = -1
+    wide, high = math.ceil(window[0] / cell), math.ceil(window[1] / cell)
+    turns = math.ceil(window[2] / step_rad)
+    fractions[:] = 0.0
+    best_total = -1
     for t in range(-turns, turns + 1):
         yaw = middle[2] + t * step_rad
         c, s = math.cos(yaw), math.sin(yaw)
@@ -111,12 +111,12 @@ def search(
                     b = math.floor((y + s * points[k, 0] + c * points[k, 1]) / cell) + n // 2
                     if 0 <= a < n and 0 <= b < n:
                         total += image[a, b]
-                share = total / (4.0 * max(count, 1))
-                shares[i + wide, j + high] = max(shares[i + wide, j + high], share)
-                if total > most:
-                    most = total
+                fraction = total / (4.0 * max(count, 1))
+                fractions[i + wide, j + high] = max(fractions[i + wide, j + high], fraction)
+                if total > best_total:
+                    best_total = total
                     best[0], best[1], best[2] = x, y, yaw
-    return float(most / (4.0 * max(count, 1)))
+    return float(best_total / (4.0 * max(count, 1)))
 
 
 @kernel

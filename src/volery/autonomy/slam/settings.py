@@ -21,7 +21,7 @@ class ImuNoise:
 class ScanMatching:
     """Comparison of returns with the map (modelling choices, tuned on recorded flights)."""
 
-    reach_m: float = 30.0
+    max_range_m: float = 30.0
     """Max range, as guaranteed by the data sheet of the UTM-30LX."""
     nearest_m: float = 0.45
     """Min range; nearer returns are from the vehicle itself, or noise."""

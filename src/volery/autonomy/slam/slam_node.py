@@ -74,7 +74,7 @@ _NOTICED_NS, _SEEN_NS = round(1.5 * NS_PER_S), NS_PER_S // 2
 _QUEUE = 500
 """Queue of samples while the node's process is busy: two seconds at 200 Hz."""
 _NOISE = "[gyro, its walk, its bias, accelerometer, its walk, its bias]"
-_MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
+_MAX_RAD_S, _MAX_M_S2 = 60.0, 500.0
 """Beyond the range of any IMU."""
 
 
@@ -109,7 +109,7 @@ class Slam(SavedAttributes, Node):
 
     WARMUP_TASKS = (
         "volery.autonomy.slam.warmup:motion",
-        "volery.autonomy.slam.warmup:known_places",
+        "volery.autonomy.slam.warmup:loop_closure",
         "volery.autonomy.slam.warmup:lost_motion",
         "volery.autonomy.slam.warmup:sight",
         "volery.autonomy.perception.warmup:scan_returns",
@@ -123,9 +123,11 @@ class Slam(SavedAttributes, Node):
         self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
         self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
         self._matching = ScanMatching(
-            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value)
+            max_range_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value)
         )
-        self._standing = float(self.declare_parameter("landed_height_m", 0.2, min_value=0.0).value)
+        self._landed_height_m = float(
+            self.declare_parameter("landed_height_m", 0.2, min_value=0.0).value
+        )
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         period = NS_PER_S / float(
             self.declare_parameter("scan_rate_hz", 20.0, min_value=0.1, max_value=1000.0).value
@@ -146,7 +148,7 @@ class Slam(SavedAttributes, Node):
 
     def _begin(self) -> None:
         self._tracker = Tracker(self._start, self._imu_noise, self._matching)
-        self._tracker.standing_height = self._standing
+        self._tracker.landed_height_m = self._landed_height_m
         self._level = LevelOdometry()
         self._keyframe_graph = KeyframeGraph(self._matching, self._start, self._has_loops)
         self._health = SlamHealth(
@@ -184,8 +186,8 @@ class Slam(SavedAttributes, Node):
     def _on_imu(self, message: Imu) -> None:
         w, a = message.angular_velocity, message.linear_acceleration
         time_ns, newest = stamp_of(message), self._tracker.time_ns
-        if not (abs(w.x) + abs(w.y) + abs(w.z) < _MOST_RAD_S and
-                abs(a.x) + abs(a.y) + abs(a.z) < _MOST_M_S2):  # fmt: skip  # leaves out nan
+        if not (abs(w.x) + abs(w.y) + abs(w.z) < _MAX_RAD_S and
+                abs(a.x) + abs(a.y) + abs(a.z) < _MAX_M_S2):  # fmt: skip  # leaves out nan
             self._refused += 1
             return
         if newest and (time_ns < newest - _JUMP_NS or time_ns > newest + _LONGEST_GAP_NS):
@@ -266,8 +268,8 @@ class Slam(SavedAttributes, Node):
         self._pose.publish(messages.pose_in_map(t.time_ns, position, attitude, sigmas))
         here, own = self._level.follow(t.state)
         turn = rotations.multiply(attitude, rotations.conjugate(own))
-        place = position - rotations.rotate(turn, here)
-        self._tf.publish(messages.map_from_odom(t.time_ns, self._uav, place, turn))
+        translation = position - rotations.rotate(turn, here)
+        self._tf.publish(messages.map_from_odom(t.time_ns, self._uav, translation, turn))
 
     def _publish_status(self) -> None:
         t, graph, now = self._tracker, self._keyframe_graph, self.get_clock().now_ns()

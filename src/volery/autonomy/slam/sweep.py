@@ -39,11 +39,11 @@ class Sweep(NamedTuple):
         """Whether its mount is not level."""
         return self.nod != 0.0 or self.last_nod != 0.0
 
-    def points(self, nearest_m: float, reach_m: float, times: Times, states: Array) -> Array:
+    def points(self, nearest_m: float, max_range_m: float, times: Times, states: Array) -> Array:
         """Returns points (K, 3) between two ranges, m in the newest body frame; see `unskew`."""
         points = np.empty((len(self.ranges), 3))
         count = unskew(
-            self.ranges, nearest_m, reach_m, self.angle_min, self.angle_step, self.first_ns,
+            self.ranges, nearest_m, max_range_m, self.angle_min, self.angle_step, self.first_ns,
             self.beam_ns, self.nod, self.last_nod, self.mount, times, states, points,
         )  # fmt: skip
         return points[:count]
@@ -64,7 +64,7 @@ class SweepPoints(NamedTuple):
 def unskew(
     ranges: NDArray[np.float32],
     nearest: float,
-    reach: float,
+    max_range: float,
     angle_min: float,
     angle_step: float,
     first_ns: int,
@@ -85,19 +85,19 @@ def unskew(
     last, count, row = max(len(ranges) - 1, 1), 0, 0
     for beam in range(len(ranges)):
         distance = ranges[beam]
-        if not nearest <= distance <= reach:  # leaves out nan
+        if not nearest <= distance <= max_range:  # leaves out nan
             continue
         moment = first_ns + beam * beam_ns
         while row < len(times) - 2 and times[row + 1] < moment:
             row += 1
         span = float(times[row + 1] - times[row])
-        share = min(max((moment - times[row]) / span, 0.0), 1.0)
+        fraction = min(max((moment - times[row]) / span, 0.0), 1.0)
         angle = angle_min + beam * angle_step
         x, y = distance * math.cos(angle), distance * math.sin(angle)
         tilt = nod + beam / last * (last_nod - nod)
         bx, by, bz = math.cos(tilt) * x + mount[0], y + mount[1], -math.sin(tilt) * x + mount[2]
         one, two = states[row], states[row + 1]
-        keep = 1.0 - share
+        keep = 1.0 - fraction
         if (
             one[Q] * two[Q]
             + one[Q + 1] * two[Q + 1]
@@ -105,15 +105,18 @@ def unskew(
             + (one[Q + 3] * two[Q + 3])
             < 0.0
         ):
-            share = -share
-        qx, qy = keep * one[Q] + share * two[Q], keep * one[Q + 1] + share * two[Q + 1]
-        qz, qw = keep * one[Q + 2] + share * two[Q + 2], keep * one[Q + 3] + share * two[Q + 3]
+            fraction = -fraction
+        qx, qy = keep * one[Q] + fraction * two[Q], keep * one[Q + 1] + fraction * two[Q + 1]
+        qz, qw = (
+            keep * one[Q + 2] + fraction * two[Q + 2],
+            keep * one[Q + 3] + fraction * two[Q + 3],
+        )
         norm = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
         wx, wy, wz = rotate_vector(qx * norm, qy * norm, qz * norm, qw * norm, bx, by, bz)
-        share = abs(share)
-        wx += keep * one[P] + share * two[P] - now[P]
-        wy += keep * one[P + 1] + share * two[P + 1] - now[P + 1]
-        wz += keep * one[P + 2] + share * two[P + 2] - now[P + 2]
+        fraction = abs(fraction)
+        wx += keep * one[P] + fraction * two[P] - now[P]
+        wy += keep * one[P + 1] + fraction * two[P + 1] - now[P + 1]
+        wz += keep * one[P + 2] + fraction * two[P + 2] - now[P + 2]
         bx, by, bz = rotate_vector(-now[Q], -now[Q + 1], -now[Q + 2], now[Q + 3], wx, wy, wz)
         points[count, 0], points[count, 1], points[count, 2] = bx, by, bz
         count += 1

@@ -43,7 +43,7 @@ from volery.core.vectors import norm
 
 _KEPT = 64
 """Number of IMU samples whose states are stored to place beams: 0.3 s at 200 Hz."""
-_STANDING_M_S, _STANDING_NS = 0.3, 2 * NS_PER_S
+_STATIONARY_M_S, _STATIONARY_NS = 0.3, 2 * NS_PER_S
 """Max estimated speed, or min time near the ground, of a quiet vehicle that counts as standing."""
 _SHOCK_M_S2 = 30.0
 """Acceleration of a collision: a sample's error may then be as large as its value."""
@@ -63,10 +63,10 @@ class Tracker(SavedAttributes):
     """
 
     STATE = (
-        "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "sight",
-        "standing_height", "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting",
+        "state", "covariance", "is_ready", "is_stationary", "has_flown", "match", "sight",
+        "landed_height_m", "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting",
         "_maps", "_inserted", "_rest", "settling", "_broad", "_near_ground_ns", "_low_since_ns",
-        "_range", "_standing_ns", "_is_high", "refused",
+        "_range", "_stationary_ns", "_is_high", "refused",
     )  # fmt: skip
 
     def __init__(
@@ -77,10 +77,10 @@ class Tracker(SavedAttributes):
         self.state = np.zeros(STATE_NUMBERS)
         self.state[Q + 3] = 1.0
         self.covariance = np.zeros((STATES, STATES))
-        self.is_ready = self.is_standing = self.has_flown = False
+        self.is_ready = self.is_stationary = self.has_flown = False
         self.match: dict[str, Match] = {}
         self.sight = KidnappingDetector()
-        self.standing_height = 0.2
+        self.landed_height_m = 0.2
         self.travelled_m = 0.0
         self.refused = 0
         self._times = np.zeros(_KEPT, np.int64)
@@ -97,7 +97,7 @@ class Tracker(SavedAttributes):
         self._near_ground_ns: int | None = None
         self._low_since_ns: int | None = None
         self._range: tuple[int, float] | None = None
-        self._standing_ns = 0
+        self._stationary_ns = 0
         self._is_high = False
         """Whether the sonar indicates flight: a hover is as quiet as standing."""
         n = self.imu_noise
@@ -198,30 +198,30 @@ class Tracker(SavedAttributes):
         turn = rotations.matrix(self.state[Q : Q + 4])
         self.covariance[:] = first_covariance(self.imu_noise, turn)
         self._stay(time_ns)
-        self.is_ready = self.is_standing = True
+        self.is_ready = self.is_stationary = True
         normal = turn[:, 2]
-        x, y, z = self.start[:3] - self.standing_height * normal
+        x, y, z = self.start[:3] - self.landed_height_m * normal
         self._broad[:] = (z, -normal[0] / normal[2], -normal[1] / normal[2], x, y, z)
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
 
     def _stay(self, time_ns: int) -> None:
         """Fills the stored states with the current one."""
-        self._standing_ns = time_ns
+        self._stationary_ns = time_ns
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
         self._states[:] = self.state
 
     def _keep_still(self, time_ns: int) -> None:
         """Applies zero velocity and the gyroscope's bias while the vehicle stands."""
-        if time_ns - self._standing_ns < NS_PER_S // 10:
+        if time_ns - self._stationary_ns < NS_PER_S // 10:
             return
-        self._standing_ns = time_ns
-        long = self._low_since_ns is not None and time_ns - self._low_since_ns > _STANDING_NS
+        self._stationary_ns = time_ns
+        long = self._low_since_ns is not None and time_ns - self._low_since_ns > _STATIONARY_NS
         low = not self.has_flown or (
             self._near_ground_ns is not None
-            and (long or norm(self.state[V : V + 3]) < _STANDING_M_S)
+            and (long or norm(self.state[V : V + 3]) < _STATIONARY_M_S)
         )
-        self.is_standing = low and self._rest.is_quiet()
-        if self.is_standing:
+        self.is_stationary = low and self._rest.is_quiet()
+        if self.is_stationary:
             hold_still(self.state, self.covariance, self._rest.mean_gyro(), self.imu_noise)
         else:
             self.has_flown = True
@@ -234,7 +234,7 @@ class Tracker(SavedAttributes):
         if sweep.first_ns < self._times[0] or in_gap:
             self.refused += 1
             return None
-        points = sweep.points(m.nearest_m, m.reach_m, self._times, self._states)
+        points = sweep.points(m.nearest_m, m.max_range_m, self._times, self._states)
         if self.is_astray:
             self.sight = KidnappingDetector()
             if not self.recovery.find(
@@ -256,8 +256,8 @@ class Tracker(SavedAttributes):
         is_drawn = self._draw(sweep, points, kinds)
         turned = moved_points(points, self.state[Q : Q + 4], self.state[:3])
         if self.has_flown:
-            standing = turned[kinds == UPRIGHT, :2]
-            self.sight.take(self.time_ns, standing, self.state[:2], is_level=not sweep.nods)
+            uprights = turned[kinds == UPRIGHT, :2]
+            self.sight.take(self.time_ns, uprights, self.state[:2], is_level=not sweep.nods)
         return SweepPoints(turned, kinds, is_drawn)
 
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:

@@ -21,9 +21,9 @@ Cells = NDArray[np.float32]
 CELL_M = 0.5
 LAYER_M = 1.0
 CELLS, LAYERS = 192, 16
-MOST = 60.0
+MAX_RETURNS = 60.0
 """Returns of a cell after which its sums stay constant."""
-LEAST = 2.0
+MIN_RETURNS = 2.0
 """Min returns of a cell that counts."""
 
 
@@ -36,7 +36,7 @@ def add_upright(keys: Keys, cells: Cells, x: float, y: float, z: float) -> None:
     if keys[a, b, c] != key:
         keys[a, b, c] = key
         cell[:] = 0.0
-    if cell[0] >= MOST:
+    if cell[0] >= MAX_RETURNS:
         return
     cell[0] += 1.0
     fx, fy = x - (i + 0.5) * CELL_M, y - (j + 0.5) * CELL_M
@@ -65,7 +65,7 @@ def nearest_upright(
             a = i % CELLS
             for j in range(cj - 1, cj + 2):
                 b = j % CELLS
-                if keys[a, b, c] != key_of(i, j, k) or cells[a, b, c, 0] < LEAST:
+                if keys[a, b, c] != key_of(i, j, k) or cells[a, b, c, 0] < MIN_RETURNS:
                     continue
                 cell = cells[a, b, c]
                 mx, my = (i + 0.5) * CELL_M + cell[1], (j + 0.5) * CELL_M + cell[2]

@@ -20,7 +20,7 @@ from volery.core.arrays import read_only
 from volery.core.clock import NS_PER_S
 
 _PERIOD_NS = NS_PER_S // 200
-_STANDING = 100
+_NUM_STATIONARY = 100
 """Number of IMU samples until it has stood still for half a second."""
 
 
@@ -33,7 +33,7 @@ def motion() -> None:
         for _, time_ns in zip(range(count), readings, strict=False):
             tracker.add_imu(time_ns, np.zeros(3), np.array([0.0, 0.0, GRAVITY_M_S2]))
 
-    feel(2 * _STANDING)
+    feel(2 * _NUM_STATIONARY)
     assert tracker.is_ready
     ranges = read_only(np.array([1.0, 2.0, np.inf], np.float32))
     tracker.add_sweep(Sweep("level", tracker.time_ns, 1e6, 0.0, 0.1, ranges, np.zeros(3)))
@@ -43,7 +43,7 @@ def motion() -> None:
     messages.odometry(0, "uav1", level, tracker.covariance[:9, :9])
 
 
-def known_places() -> None:
+def loop_closure() -> None:
     """Compiles the kernels of loop closures: a keyframe is matched with older ones."""
     grid = np.stack(np.meshgrid(*2 * (np.linspace(-5.0, 5.0, 10),)), -1).reshape(-1, 2)
     points = np.column_stack([grid, np.zeros(len(grid))])
@@ -60,8 +60,8 @@ def sight() -> None:
     before = np.column_stack([np.linspace(-20.0, 20.0, 80), np.zeros(80)])
     now = before + np.where(np.arange(80) % 2, 3.0, 0.0)[:, None] * np.array([0.0, 1.0])
     eyes = KidnappingDetector()
-    for time_ns, places in ((0, before), (NS_PER_S // 4, now)):
-        eyes.take(time_ns, places, np.zeros(2), is_level=True)
+    for time_ns, points in ((0, before), (NS_PER_S // 4, now)):
+        eyes.take(time_ns, points, np.zeros(2), is_level=True)
 
 
 def lost_motion() -> None:

@@ -26,7 +26,7 @@ class AresSettings(NamedTuple):
     num_levels: int = 20
     """Number of levels after which the search ends."""
     max_horizon: int = 5
-    """Most steps of a look-ahead."""
+    """Maximum steps of a look-ahead."""
     num_particles: int = 10
     more_particles: int = 2
     max_particles: int = 30
@@ -107,9 +107,9 @@ class AresSearch:
         """Enters the next level, or makes the next round on this one look farther."""
         chosen, found = self._settings, self._found
         self._found = []
-        least = min(cost for cost, _ in found)
-        share = self._cost / (chosen.num_levels - self._level)
-        if least > max(self._cost - share, chosen.solved_cost):
+        lowest = min(cost for cost, _ in found)
+        cost_step = self._cost / (chosen.num_levels - self._level)
+        if lowest > max(self._cost - cost_step, chosen.solved_cost):
             self._look_farther()
             return
         ends = [
@@ -120,9 +120,9 @@ class AresSearch:
         kept = order[: max(1, len(order) // 2)]
         drawn = [kept[self._draw(len(kept))] for _ in range(len(order) - len(kept))]
         self._flights = [ends[k] for k in (*kept, *drawn)]
-        self._cost, self._level = least, self._level + 1
+        self._cost, self._level = lowest, self._level + 1
         self._horizon, self._particles = 1, chosen.num_particles
-        self.is_done = least <= chosen.solved_cost or self._level == chosen.num_levels
+        self.is_done = lowest <= chosen.solved_cost or self._level == chosen.num_levels
 
     def _flown(self, flock: Array, accelerations: Array) -> list[Array]:
         """Returns the flocks (4, N) after each step of the look-ahead."""

@@ -179,11 +179,11 @@ class FlockNode(SavedAttributes, Node):
         goals: Array = position + (self._waypoints[self._next] - middle)
         return goals
 
-    def _preferred(self, ways: Array) -> Array:
-        """Returns velocities (M, 2) along ways (M, 2) m to the goals."""
-        distance = np.linalg.norm(ways, axis=1, keepdims=True)
+    def _preferred(self, offsets: Array) -> Array:
+        """Returns velocities (M, 2) along offsets (M, 2) m to the goals."""
+        distance = np.linalg.norm(offsets, axis=1, keepdims=True)
         speed = np.minimum(self._speed, _APPROACH * distance)
-        preferred: Array = ways / np.maximum(distance, 1e-9) * speed
+        preferred: Array = offsets / np.maximum(distance, 1e-9) * speed
         return preferred
 
     def _flee(self, away: Array, preferred: Array) -> None:

@@ -81,11 +81,11 @@ class FormationSearch:
         """Returns the best plan so far; of a flock in which some have none, a plan of no steps."""
         if not self._num_rest:
             return self._search.plan()
-        ways = None if self._joining is None else self._joining.ways()
-        if ways is None:
-            ways = self._start[None]
-        cost = float(fitness_cost(np.ascontiguousarray(ways[-1])))
-        steps = ways.transpose(0, 2, 1)
+        trajectories = None if self._joining is None else self._joining.trajectories()
+        if trajectories is None:
+            trajectories = self._start[None]
+        cost = float(fitness_cost(np.ascontiguousarray(trajectories[-1])))
+        steps = trajectories.transpose(0, 2, 1)
         return AresPlan(steps[:, :, :2], steps[:, :, 2:], cost, cost <= self._settings.solved_cost)
 
     def advance(self) -> None:

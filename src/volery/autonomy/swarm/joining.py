@@ -1,9 +1,9 @@
-"""Plans the ways on which further birds join a formation that a plan has formed.
+"""Plans the trajectories on which further birds join a formation that a plan has formed.
 
 A V grows at the ends of its arms: two positions that nothing but the last bird of each arm decides.
-So each bird needs only a way to a position that moves with the formation. It flies there as fast as
-it may accelerate and brake, past all birds whose ways are known; where the direct way comes too
-near to one of them, it first flies to a random point.
+So each bird needs only a trajectory to a position that moves with the formation. It flies there as
+fast as it may accelerate and brake, past all birds whose trajectories are known; where the direct
+path comes too near to one of them, it first flies to a random point.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import uniform
 from volery.core.vectors import norm
 
-_MOST_STEPS = 100
+_MAX_STEPS = 100
 """Steps after the plan of the formation in which all birds must have joined."""
 _TRIALS = 100
-"""Ways that are tried for a bird."""
+"""Trajectories that are tried for a bird."""
 _DODGES = 30
 """Accelerations that are tried in a step."""
-_MOST_REPEATS = 20
-"""Rounds in which a bird found no way, until the search ends."""
+_MAX_REPEATS = 20
+"""Rounds in which a bird found no trajectory, until the search ends."""
 _DETOUR = 8.0
 """Largest distance of a random point from its position in the formation, wing spans."""
-_MOST_DETOUR = 10
-"""Most steps in which it flies to that point."""
+_MAX_DETOUR = 10
+"""Maximum steps in which it flies to that point."""
 _TURN = 2.0 * math.pi
 _ARRIVED = 1e-9
 _LEFT = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -42,7 +42,7 @@ _LEFT = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 class Joining:
-    """Plans the ways of the birds that join a formation, one after the other.
+    """Plans the trajectories of the birds that join a formation, one after the other.
 
     start: (4, N) of all birds. members: rows of those in formation, which fly as `plan` says.
     key: of the random numbers.
@@ -58,10 +58,10 @@ class Joining:
     ) -> None:
         self._limits, self._key, self._counter = limits, key, 0
         self._formed = tuple(members)
-        self._ways = np.empty((len(plan.positions) + _MOST_STEPS, 4, start.shape[1]))
-        self._ways[0] = start
+        self._trajectories = np.empty((len(plan.positions) + _MAX_STEPS, 4, start.shape[1]))
+        self._trajectories[0] = start
         self._formed_steps = self._settle(plan)
-        formation = self._ways[self._formed_steps][:, self._formed]
+        formation = self._trajectories[self._formed_steps][:, self._formed]
         self._velocity = formation[2:].mean(axis=1)
         rest = [row for row in range(start.shape[1]) if row not in set(members)]
         ends, ranks = free_positions(formation, start[:, rest])
@@ -74,57 +74,60 @@ class Joining:
     def _begin(self, order: Sequence[int]) -> None:
         self._order, self._joined = tuple(order), 0
         self._steps = self._formed_steps
-        """Steps until all birds with a way are in formation."""
+        """Steps until all birds with a trajectory are in formation."""
 
     @property
     def is_done(self) -> bool:
-        """Whether all birds have a way, or one has none."""
-        return self._joined == len(self._order) or self._repeats > _MOST_REPEATS
+        """Whether all birds have a trajectory, or one has none."""
+        return self._joined == len(self._order) or self._repeats > _MAX_REPEATS
 
-    def ways(self) -> Array | None:
+    def trajectories(self) -> Array | None:
         """Returns all birds (T + 1, 4, N) at each step; None while one has no way."""
-        return self._ways[: self._steps + 1] if self._joined == len(self._order) else None
+        return self._trajectories[: self._steps + 1] if self._joined == len(self._order) else None
 
     def advance(self) -> None:
-        """Plans the way of the next bird. One that finds none is the first of another round."""
+        """Plans the next bird's trajectory. One that finds none is the first of another round."""
         row, before = self._order[self._joined], self._order[: self._joined]
-        others = np.ascontiguousarray(self._ways[:, :2, [*self._formed, *before]])
-        way, joined = self._way(row, 0, self._positions[row], self._velocity, others)
+        others = np.ascontiguousarray(self._trajectories[:, :2, [*self._formed, *before]])
+        trajectory, joined = self._trajectory(row, 0, self._positions[row], self._velocity, others)
         if joined < 0:
             self._repeats += 1
             self._begin([row, *(other for other in self._order if other != row)])
             return
-        self._ways[:, :, row] = way
+        self._trajectories[:, :, row] = trajectory
         self._joined += 1
         self._steps = max(self._steps, joined)
 
     def _settle(self, plan: AresPlan) -> int:
-        """Fills the ways of the birds in formation; returns the steps until it is exact.
+        """Fills the trajectories of the birds in formation; returns the steps until it is exact.
 
         A plan ends near a V. What is missing would add up along the arms.
         """
         end = len(plan.positions) - 1
         flown = np.concatenate((plan.positions, plan.velocities), axis=2).transpose(0, 2, 1)
         velocity = flown[-1, 2:].mean(axis=1)
-        self._ways[: end + 1, :, self._formed] = flown
-        alone = np.empty((len(self._ways) - end, 2, 0))
+        self._trajectories[: end + 1, :, self._formed] = flown
+        alone = np.empty((len(self._trajectories) - end, 2, 0))
         last = end
         for row, position in zip(self._formed, exact_formation(flown[-1]).T, strict=True):
-            way, steps = self._way(row, end, position, velocity, alone)
-            self._ways[end:, :, row] = way
+            trajectory, steps = self._trajectory(row, end, position, velocity, alone)
+            self._trajectories[end:, :, row] = trajectory
             last = max(last, end + steps)
         return last
 
-    def _way(
+    def _trajectory(
         self, row: int, begin: int, position: Array, velocity: Array, others: Array
     ) -> tuple[Array, int]:
-        """Returns the way (S, 4) of a bird from a step on, and when it joins; see `way_into`."""
-        way = np.empty((len(others), 4))
-        start = self._ways[begin][:, row].copy()
-        steps, self._counter = way_into(
-            start, position, velocity, others, self._limits, self._key, self._counter, way
+        """Returns a bird's trajectory (S, 4) from a step on, and when it joins.
+
+        See `trajectory_into`.
+        """
+        trajectory = np.empty((len(others), 4))
+        start = self._trajectories[begin][:, row].copy()
+        steps, self._counter = trajectory_into(
+            start, position, velocity, others, self._limits, self._key, self._counter, trajectory
         )
-        return way, steps
+        return trajectory, steps
 
 
 def exact_formation(flock: Array) -> Array:
@@ -149,7 +152,7 @@ def free_positions(flock: Array, start: Array) -> tuple[Array, NDArray[np.int64]
     """Returns positions (M, 2) at the ends of a formation's arms, and how far out each is (M,).
 
     flock: (4, N) in formation, where all fly alike. start: (4, M) of the birds that join. Those on
-    the left go to the left arm, the outermost farthest, so that their ways hardly cross. Both arms
+    the left go to the left arm, the outermost farthest, so that their paths hardly cross. Both arms
     get equally long where that is possible.
     """
     ahead = flock[2:].mean(axis=1)
@@ -163,9 +166,9 @@ def free_positions(flock: Array, start: Array) -> tuple[Array, NDArray[np.int64]
     num_left = min(max((count + rows[1] - rows[0]) // 2, 0), count)
     order = np.argsort(-(left @ start[:2]), kind="stable")
     positions, ranks = np.empty((count, 2)), np.empty(count, np.int64)
-    for place, row in enumerate(order):
-        is_left = place < num_left
-        out = num_left - place if is_left else place - num_left + 1
+    for rank, row in enumerate(order):
+        is_left = rank < num_left
+        out = num_left - rank if is_left else rank - num_left + 1
         step = BEST_ASIDE * (left if is_left else -left) - BEST_BEHIND * ahead
         positions[row] = ends[0 if is_left else 1] + out * step
         ranks[row] = out
@@ -173,7 +176,7 @@ def free_positions(flock: Array, start: Array) -> tuple[Array, NDArray[np.int64]
 
 
 @kernel
-def way_into(
+def trajectory_into(
     start: Any,
     position: Any,
     velocity: Any,
@@ -181,9 +184,9 @@ def way_into(
     limits: FlockLimits,
     key: np.uint64,
     counter: int,
-    way: Any,
+    trajectory: Any,
 ) -> tuple[int, int]:
-    """Searches a way of a bird to a position in a formation that flies straight.
+    """Searches a trajectory of a bird to a position in a formation that flies straight.
 
     Parameters
     ----------
@@ -197,21 +200,21 @@ def way_into(
         What the bird keeps.
     key, counter
         Stream of random numbers, and the number of the next one.
-    way
+    trajectory
         (S, 4): receives the bird at each step.
 
     Returns
     -------
     steps, counter
-        Steps until the bird has joined, -1 if no way was found, and the next number.
+        Steps until the bird has joined, -1 if no trajectory was found, and the next number.
 
     """
     for trial in range(_TRIALS):
         turn, far = _TURN * uniform(key, counter), _DETOUR * math.sqrt(uniform(key, counter + 1))
-        detour = 0 if trial == 0 else int(_MOST_DETOUR * uniform(key, counter + 2))
+        detour = 0 if trial == 0 else int(_MAX_DETOUR * uniform(key, counter + 2))
         x, y = far * math.cos(turn), far * math.sin(turn)
         joined, counter = _fly(
-            start, position, velocity, others, limits, detour, x, y, key, counter + 3, way
+            start, position, velocity, others, limits, detour, x, y, key, counter + 3, trajectory
         )
         if joined >= 0:
             return joined, counter
@@ -230,7 +233,7 @@ def _fly(
     y: float,
     key: np.uint64,
     counter: int,
-    way: Any,
+    trajectory: Any,
 ) -> tuple[int, int]:
     """Flies to the position, for the steps of a detour to (x, y) beside it.
 
@@ -238,10 +241,10 @@ def _fly(
     arrive, and the next counter.
     """
     for k in range(4):
-        way[0, k] = start[k]
+        trajectory[0, k] = start[k]
     arrived = -1
-    for step in range(1, len(way)):
-        before, after = way[step - 1], way[step]
+    for step in range(1, len(trajectory)):
+        before, after = trajectory[step - 1], trajectory[step]
         offset_x = position[0] + (step - 1) * velocity[0] - before[0]
         offset_y = position[1] + (step - 1) * velocity[1] - before[1]
         if step <= detour:
@@ -249,7 +252,7 @@ def _fly(
         ax, ay = _approach(before, offset_x, offset_y, velocity, limits)
         _accelerate(before, ax, ay, limits, after)
         dodges = 0
-        while _is_too_near(way, others, step, limits.min_distance):
+        while _is_too_near(trajectory, others, step, limits.min_distance):
             if dodges == _DODGES:
                 return -1, counter
             dodges += 1
@@ -271,10 +274,10 @@ def _approach(
 ) -> tuple[float, float]:
     """Returns the acceleration towards a position at an offset that moves with `velocity`."""
     distance = math.hypot(offset_x, offset_y)
-    most = limits.max_acceleration
+    limit = limits.max_acceleration
     speed = distance
-    if distance > most:  # what it can brake within the distance
-        speed = 0.5 * (math.sqrt(most * most + 8.0 * most * distance) - most)
+    if distance > limit:  # what it can brake within the distance
+        speed = 0.5 * (math.sqrt(limit * limit + 8.0 * limit * distance) - limit)
     part = speed / distance if distance > 0.0 else 0.0
     return (
         velocity[0] + part * offset_x - bird[2],
@@ -297,16 +300,16 @@ def _accelerate(bird: Any, ax: float, ay: float, limits: FlockLimits, moved: Any
 
 
 @inner_kernel
-def _is_too_near(way: Any, others: Any, step: int, min_distance: float) -> bool:
+def _is_too_near(trajectory: Any, others: Any, step: int, min_distance: float) -> bool:
     """Returns whether the bird comes too near to another one in a step."""
     if min_distance <= 0.0:
         return False
     for j in range(others.shape[2]):
         px, py = (
-            way[step - 1, 0] - others[step - 1, 0, j],
-            way[step - 1, 1] - others[step - 1, 1, j],
+            trajectory[step - 1, 0] - others[step - 1, 0, j],
+            trajectory[step - 1, 1] - others[step - 1, 1, j],
         )
-        qx, qy = way[step, 0] - others[step, 0, j], way[step, 1] - others[step, 1, j]
+        qx, qy = trajectory[step, 0] - others[step, 0, j], trajectory[step, 1] - others[step, 1, j]
         if margin_between(px, py, qx, qy, min_distance) < 0.0:
             return True
     return False

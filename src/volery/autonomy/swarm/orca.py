@@ -30,19 +30,19 @@ class OrcaSettings(NamedTuple):
     """Parameters of the avoidance."""
 
     distance_m: float = 2.0
-    """Least distance between the centres of two UAVs."""
+    """Minimum distance between the centres of two UAVs."""
     horizon_s: float = 4.0
     """Time ahead in which they keep it."""
     step_s: float = 0.5
     """Time in which UAVs that are nearer part."""
     obstacle_m: float = 1.0
-    """Least distance of a UAV's centre from obstacles."""
+    """Minimum distance of a UAV's centre from obstacles."""
     braking_s: float = 1.2
     """Time in which a UAV may reach that distance at its present speed."""
     turn_rad: float = 0.35
     """Turn to the right of a preferred velocity that a neighbour forbids; without it, UAVs that
     meet symmetrically stop."""
-    way_s: float = 1.0
+    give_way_s: float = 1.0
     """Time ahead in which a UAV is out of the way of those that prefer to fly faster."""
     max_speed_m_s: float = 5.0
 
@@ -77,10 +77,14 @@ def _choose_all(
     """Fills the wanted velocities (N, 2)."""
     count = len(position)
     num_obstacles = 4 + len(cylinders) + echoes.shape[1]
-    most = num_obstacles
+    max_planes = num_obstacles
     for i in range(count):
-        most = max(most, num_obstacles + first[i + 1] - first[i])
-    planes, passing, relaxed = np.empty((most, 3)), np.empty((most, 3)), np.empty((most, 3))
+        max_planes = max(max_planes, num_obstacles + first[i + 1] - first[i])
+    planes, passing, relaxed = (
+        np.empty((max_planes, 3)),
+        np.empty((max_planes, 3)),
+        np.empty((max_planes, 3)),
+    )
     for i in range(count):
         hard = _add_obstacles(planes, position, i, arena, cylinders, echoes, settings)
         end = hard
@@ -105,7 +109,7 @@ def _choose_all(
             i,
             near,
             settings.distance_m,
-            settings.way_s,
+            settings.give_way_s,
             settings.step_s,
             settings.max_speed_m_s,
             passing,

@@ -24,7 +24,7 @@ _TURN = 2.0 * math.pi
 _ITERATIONS = 10
 """Moves of a bird's particles."""
 _MAX_ROUNDS = 3
-"""Most searches of each bird."""
+"""Maximum searches of each bird."""
 _PROGRESS = 1e-3
 """Decrease of the cost in a round, relative to it, below which the search ends."""
 
@@ -37,7 +37,7 @@ class FlockLimits(NamedTuple):
     max_speed: float = math.inf
     """Wing spans per step."""
     max_acceleration: float = math.inf
-    """Most change of a velocity in a step, wing spans per step; at most a bird's speed."""
+    """Maximum change of a velocity in a step, wing spans per step; at most a bird's speed."""
 
 
 class _Flock(NamedTuple):
@@ -119,8 +119,8 @@ def best_accelerations(
             )
         if before - cost <= _PROGRESS * cost:
             break
-    least = limits.min_distance
-    is_near = least > 0.0 and approach_margin(start, flock.moved, least) < 0.0
+    min_distance = limits.min_distance
+    is_near = min_distance > 0.0 and approach_margin(start, flock.moved, min_distance) < 0.0
     return math.inf if is_near else fitness_cost(flock.moved), counter
 
 
@@ -160,13 +160,13 @@ def _search(
 ) -> tuple[float, int]:
     """Searches the acceleration of bird i; returns the flock's cost and the next counter."""
     matching, view = _of_others(flock, i, benefit)
-    most = min(math.hypot(start[2, i], start[3, i]), limits.max_acceleration)
-    counter = _scatter(swarm, best[0, i], best[1, i], most, key, counter)
+    limit = min(math.hypot(start[2, i], start[3, i]), limits.max_acceleration)
+    counter = _scatter(swarm, best[0, i], best[1, i], limit, key, counter)
     leader = 0
     for iteration in range(_ITERATIONS):
         for k in range(len(swarm.cost)):
             if iteration:
-                counter = _move(swarm, k, leader, most, key, counter)
+                counter = _move(swarm, k, leader, limit, key, counter)
             size, direction = swarm.position[k, 0], swarm.position[k, 1]
             accelerate(start, i, size, direction, horizon, limits.max_speed, flock.moved)
             if limits.min_distance > 0.0 and _is_near(start, flock.moved, i, limits.min_distance):
@@ -184,13 +184,13 @@ def _search(
 
 @inner_kernel
 def _scatter(
-    swarm: _Swarm, size: float, direction: float, most: float, key: np.uint64, counter: int
+    swarm: _Swarm, size: float, direction: float, limit: float, key: np.uint64, counter: int
 ) -> int:
     """Places the first particle at the present acceleration, the others at random."""
     for k in range(len(swarm.cost)):
-        swarm.position[k, 0] = most * uniform(key, counter)
+        swarm.position[k, 0] = limit * uniform(key, counter)
         swarm.position[k, 1] = _TURN * uniform(key, counter + 1)
-        swarm.velocity[k, 0] = _FIRST_SPEED * most * (2.0 * uniform(key, counter + 2) - 1.0)
+        swarm.velocity[k, 0] = _FIRST_SPEED * limit * (2.0 * uniform(key, counter + 2) - 1.0)
         swarm.velocity[k, 1] = _FIRST_SPEED * _TURN * (2.0 * uniform(key, counter + 3) - 1.0)
         swarm.cost[k] = math.inf
         counter += 4
@@ -202,7 +202,7 @@ def _scatter(
 
 
 @inner_kernel
-def _move(swarm: _Swarm, k: int, leader: int, most: float, key: np.uint64, counter: int) -> int:
+def _move(swarm: _Swarm, k: int, leader: int, limit: float, key: np.uint64, counter: int) -> int:
     """Moves a particle towards its own best position and the leader's; returns the counter."""
     for q in range(2):
         position = swarm.position[k, q]
@@ -213,7 +213,7 @@ def _move(swarm: _Swarm, k: int, leader: int, most: float, key: np.uint64, count
         )
         counter += 2
         moved = position + velocity
-        inside = min(max(moved, 0.0), most) if q == 0 else moved
+        inside = min(max(moved, 0.0), limit) if q == 0 else moved
         swarm.velocity[k, q] = velocity if inside == moved else 0.0
         swarm.position[k, q] = inside
     return counter
@@ -291,7 +291,7 @@ def _is_near(before: Any, after: Any, i: int, min_distance: float) -> bool:
 
 @kernel
 def approach_margin(before: Any, after: Any, min_distance: float) -> float:
-    """Returns how far the birds stay out of `min_distance` on straight ways; negative: too near.
+    """Returns how far the birds stay out of `min_distance` on straight paths; negative: too near.
 
     Two birds that are nearer at the start must only not approach.
     """

@@ -38,7 +38,7 @@ class Pursuit(SavedAttributes, Node):
 
     """
 
-    STATE = ("_is_flying", "_ticks", "_last_status", "_least_m", "_captured")
+    STATE = ("_is_flying", "_ticks", "_last_status", "_min_distance_m", "_captured")
     PARTS = ("_pursuers", "_pursued")
     WARMUP_TASKS = ("volery.autonomy.swarm.warmup:flocking",)
 
@@ -54,8 +54,8 @@ class Pursuit(SavedAttributes, Node):
         self._is_flying = False
         self._ticks = 0
         self._last_status = ""
-        self._least_m = math.inf
-        """Least distance of a pursuer from a UAV so far, m."""
+        self._min_distance_m = math.inf
+        """Minimum distance of a pursuer from a UAV so far, m."""
         self._captured: list[str] = []
         self._pursuers = TeamLink(self, pursuers, odometry, self._height)
         uavs = [name for name in named if name not in pursuers]
@@ -78,8 +78,8 @@ class Pursuit(SavedAttributes, Node):
         for k, row in enumerate(self._pursuers.members):
             if row in targets:
                 target = targets[row][1]
-                way = target.position[:2] - position[k]
-                wanted[k] = self._speed * way / max(float(np.linalg.norm(way)), 1e-9)
+                offset = target.position[:2] - position[k]
+                wanted[k] = self._speed * offset / max(float(np.linalg.norm(offset)), 1e-9)
                 heights[k] = target.position[2]
         flock = flock_within(position, velocity, self._avoidance.radius_m)
         wanted = self._avoidance.velocities(flock, wanted, Surroundings())
@@ -100,7 +100,7 @@ class Pursuit(SavedAttributes, Node):
                 for name, sample in pursued.items()
                 if name not in self._captured
             }
-            self._least_m = min(self._least_m, *distances.values(), math.inf)
+            self._min_distance_m = min(self._min_distance_m, *distances.values(), math.inf)
             self._captured += [name for name, m in distances.items() if m <= self._capture_m]
             left = [name for name in distances if name not in self._captured]
             if left:
@@ -112,7 +112,9 @@ class Pursuit(SavedAttributes, Node):
         names = self._pursuers.names
         status = {
             "targets": {names[row]: name for row, (name, _) in targets.items()},
-            "least_distance_m": None if math.isinf(self._least_m) else round(self._least_m, 3),
+            "least_distance_m": None
+            if math.isinf(self._min_distance_m)
+            else round(self._min_distance_m, 3),
             "captured": self._captured,
         }
         self._last_status = publish_status(self._status, status, self._last_status)

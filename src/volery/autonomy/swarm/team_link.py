@@ -30,14 +30,14 @@ _SENSIBLE = 1e6
 """Odometry with a larger number, m or m/s, or with NaN, is refused."""
 _FASTEST_M_S, _NOISE_M = 25.0, 1.0
 """A position farther from the last one than the UAV flies at this speed, plus noise, is a jump."""
-_DOUBT_S = 0.5
+_JUMP_REFUSAL_S = 0.5
 """Time for which jumps are refused after the last plausible position: a UAV that was displaced
 sends no other positions, one whose messages are forged sends true ones in between."""
 
 
-def number(node: Node, name: str, default: float, least: float, most: float) -> float:
+def number(node: Node, name: str, default: float, minimum: float, maximum: float) -> float:
     """Declares a parameter that is a number within limits; returns its value."""
-    parameter = node.declare_parameter(name, default, min_value=least, max_value=most)
+    parameter = node.declare_parameter(name, default, min_value=minimum, max_value=maximum)
     return float(parameter.value)
 
 
@@ -98,7 +98,9 @@ class TeamLink(SavedAttributes):
         if abs(now_ns - sample.time_ns) > _SILENCE_S * NS_PER_S:
             return False
         last, passed_s = self._samples[row], (now_ns - self._taken_ns[row]) / NS_PER_S
-        if last is None or not 0.0 <= passed_s < _DOUBT_S:  # negative: the clock was set back
+        if (
+            last is None or not 0.0 <= passed_s < _JUMP_REFUSAL_S
+        ):  # negative: the clock was set back
             return True
         moved_m = float(np.linalg.norm(sample.position - last.position))
         return moved_m < _NOISE_M + _FASTEST_M_S * passed_s

@@ -18,7 +18,7 @@ from volery.graph.messages import LaserScan
 from volery.graph.nodes.node import Node
 
 _SECTORS = 36
-_REACH_M = 8.0
+_MAX_RANGE_M = 8.0
 _LEVEL_M = 0.8
 """Height difference beyond which an echo is no obstacle: of the ground, for a UAV that tilts."""
 _TEAMMATE_M = 1.0
@@ -36,7 +36,7 @@ class TeamScans(SavedAttributes):
 
     def __init__(self, node: Node, team: TeamLink, topic: str) -> None:
         self._team = team
-        self._projector = ScanProjector(declare_mount(node, "lidar"), _REACH_M, keep_every=1)
+        self._projector = ScanProjector(declare_mount(node, "lidar"), _MAX_RANGE_M, keep_every=1)
         self._points: list[Array] = [np.empty((0, 2))] * len(team.names)
         """(P, 2) m, map: echoes of the last scan of each UAV."""
         self._num_sectors = _SECTORS if topic else 0

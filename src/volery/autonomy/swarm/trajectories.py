@@ -1,7 +1,7 @@
 """Trajectories of a swarm that keep apart in space and time, planned one after the other.
 
 Each UAV has a committed trajectory, a quintic that ends at rest, and plans a new one several times
-a second: of trajectories to points around its preferred way it commits to the best one that keeps
+a second: of trajectories to points around its preferred path it commits to the best one that keeps
 its distance from obstacles and from the committed trajectories of its neighbours at all times.
 Where it finds none, it flies on along its old one, from which later plans of others keep away. So
 committed trajectories never cross, as in MADER (J. Tordesillas, J. How, IEEE T-RO 2022) and
@@ -25,16 +25,16 @@ from volery.core.compiled import inner_kernel, kernel
 from volery.core.saved_state import SavedAttributes
 
 _TURNS = (0.0, -0.26, 0.26, -0.52, 0.52, -0.79, 0.79, -1.2, 1.2, -1.7, 1.7, 2.6, -2.6)
-"""Turns of ways from the preferred one, rad; right ones first."""
+"""Turns of paths from the preferred one, rad; right ones first."""
 _PARTS = (1.0, 0.7, 0.4, 0.15)
-"""Lengths of ways, relative to the preferred one."""
+"""Lengths of paths, relative to the preferred one."""
 _LENGTH = 0.6
-"""Length of a way, relative to speed times duration: a quintic that starts at that speed and ends
+"""Length of a path, relative to speed times duration: a quintic that starts at that speed and ends
 at rest after this length keeps the speed at first."""
 _SAMPLES = 20
 """Times at which trajectories are compared."""
 _TURN_COST, _CHANGE_COST = 0.25, 0.1
-"""Cost of a turn from the preferred way, and of a change of the turn, per rad."""
+"""Cost of a turn from the preferred path, and of a change of the turn, per rad."""
 _EPSILON_M = 1e-3
 
 
@@ -42,9 +42,9 @@ class TrajectorySettings(NamedTuple):
     """Parameters of the planning."""
 
     distance_m: float = 2.0
-    """Least distance between the trajectories of two UAVs at each time."""
+    """Minimum distance between the trajectories of two UAVs at each time."""
     obstacle_m: float = 1.0
-    """Least distance of a trajectory from obstacles."""
+    """Minimum distance of a trajectory from obstacles."""
     duration_s: float = 4.0
     """Duration of a trajectory."""
     period_s: float = 0.05
@@ -55,7 +55,7 @@ class TrajectorySettings(NamedTuple):
     """Velocity per distance from the trajectory, 1/s."""
     lost_m: float = 1.5
     """Distance from its trajectory at which a UAV gets a new one, from where it is."""
-    way_s: float = 1.0
+    give_way_s: float = 1.0
     """Time ahead in which a UAV is out of the way of those that prefer to fly faster."""
     max_speed_m_s: float = 5.0
 
@@ -68,7 +68,7 @@ class _Committed(NamedTuple):
     start_s: Any
     """(N,): times of their starts."""
     turn: Any
-    """(N,): turns from the preferred ways, rad."""
+    """(N,): turns from the preferred paths, rad."""
 
 
 class Trajectories(SavedAttributes):
@@ -125,7 +125,7 @@ def _plan_all(
     wanted: Any,
 ) -> None:
     """Renews committed trajectories and fills the velocities (N, 2) along them."""
-    count, most = len(position), 0
+    count, max_planes = len(position), 0
     trial = np.empty((2, 6))
     for i in range(count):
         x, y = _at(committed.curves[i], now_s - committed.start_s[i], settings.duration_s, 0)
@@ -136,14 +136,14 @@ def _plan_all(
                 start = position[i, axis]
                 _fill(committed.curves[i], axis, start, speed, 0.0, end, settings.duration_s)
             committed.start_s[i], committed.turn[i] = now_s, 0.0
-        most = max(most, first[i + 1] - first[i])
-    planes, relaxed = np.empty((most, 3)), np.empty((most, 3))
+        max_planes = max(max_planes, first[i + 1] - first[i])
+    planes, relaxed = np.empty((max_planes, 3)), np.empty((max_planes, 3))
     for i in range(count):
         if (calls + i) % settings.calls == 0:
             near = neighbour[first[i] : first[i + 1]]
             _, vx, vy = give_way(
-                position, preferred, i, near, settings.distance_m, settings.way_s,
-                settings.way_s, settings.max_speed_m_s, planes, relaxed,
+                position, preferred, i, near, settings.distance_m, settings.give_way_s,
+                settings.give_way_s, settings.max_speed_m_s, planes, relaxed,
             )  # fmt: skip
             _plan(
                 i, vx, vy, position, near, arena, cylinders, echoes, settings, committed, now_s,
@@ -232,8 +232,8 @@ def _is_free(
             since_s = now_s - committed.start_s[j]
             ox, oy = _at(committed.curves[j], since_s, duration, 0)
             px, py = _at(committed.curves[j], since_s + after_s, duration, 0)
-            least = min(settings.distance_m, math.hypot(x0 - ox, y0 - oy)) - _EPSILON_M
-            if math.hypot(x - px, y - py) < least:
+            min_distance = min(settings.distance_m, math.hypot(x0 - ox, y0 - oy)) - _EPSILON_M
+            if math.hypot(x - px, y - py) < min_distance:
                 return False
     return True
 
@@ -249,22 +249,22 @@ def _is_clear(
     arena: Any,
     cylinders: Any,
     echoes: Any,
-    least: float,
+    min_distance: float,
 ) -> bool:
     """Returns whether a point keeps its distance from obstacles, or that of the start (x0, y0)."""
     inside = min(x - arena[0], y - arena[1], arena[2] - x, arena[3] - y)
     before = min(x0 - arena[0], y0 - arena[1], arena[2] - x0, arena[3] - y0)
-    if inside < min(least, before) - _EPSILON_M:
+    if inside < min(min_distance, before) - _EPSILON_M:
         return False
     for k in range(len(cylinders)):
         cx, cy, radius = cylinders[k, 0], cylinders[k, 1], cylinders[k, 2]
         before = math.hypot(x0 - cx, y0 - cy) - radius
-        if math.hypot(x - cx, y - cy) - radius < min(least, before) - _EPSILON_M:
+        if math.hypot(x - cx, y - cy) - radius < min(min_distance, before) - _EPSILON_M:
             return False
     for k in range(echoes.shape[1]):
         cx, cy = position[i, 0] + echoes[i, k, 0], position[i, 1] + echoes[i, k, 1]
         before = math.hypot(x0 - cx, y0 - cy)
-        if math.hypot(x - cx, y - cy) < min(least, before) - _EPSILON_M:  # never for nan
+        if math.hypot(x - cx, y - cy) < min(min_distance, before) - _EPSILON_M:  # never for nan
             return False
     return True
 

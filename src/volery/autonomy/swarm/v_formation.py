@@ -38,22 +38,22 @@ _GAIN = 0.8
 _OVERSPEED = 1.5
 """Limit of commanded speeds, in speeds of a plan: UAVs catch up with their birds."""
 _NEAR_M = 0.4
-_DISPLACED = 1.5
+_MAX_OFFSET = 1.5
 """Distance from its bird, in wing spans, at which a UAV counts as displaced."""
 _GATHER_APART = 0.7
-"""Distance that UAVs keep on their ways to the start positions, in wing spans."""
+"""Distance that UAVs keep on their paths to the start positions, in wing spans."""
 _BOX = 3.0
 """Side of the box of random starts of seven, wing spans, after ARES; larger teams are as dense."""
 _SEVEN = 7
 _SPEEDS = (0.25, 0.75)
 """Random start velocities per axis, in wing spans per step, after ARES."""
-_DRAWS, _MOST_DRAWS = 1_000, 50_000
-_MOST_LEAD = 8
-"""Most steps that a search may last."""
-_MOST_KICKS = 10
+_DRAWS, _MAX_DRAWS = 1_000, 50_000
+_MAX_LEAD = 8
+"""Maximum steps that a search may last."""
+_MAX_KICKS = 10
 """Random changes of the velocities after searches in vain, until the best plan is flown."""
 _APART = 1.2
-"""Least distance of random starts, in wing spans."""
+"""Minimum distance of random starts, in wing spans."""
 
 
 class VFormationPhase(StrEnum):
@@ -190,12 +190,12 @@ class VFormation(SavedAttributes, Node):
             self._set_off(now_ns)
 
     def _drawn_start(self, offsets: Array) -> Array:
-        """Returns random positions (N, 2), wing spans, sorted so that the ways hardly cross."""
+        """Returns random positions (N, 2), wing spans, sorted so that the paths hardly cross."""
         count = len(offsets)
         rng = np.random.default_rng(self._seed)
         side = (_BOX + _APART) * math.sqrt(max(1.0, count / _SEVEN)) - _APART
         found: list[Array] = []
-        for draw in range(_MOST_DRAWS):
+        for draw in range(_MAX_DRAWS):
             if draw % _DRAWS == 0:  # the first ones may leave no room
                 found = []
             drawn = rng.uniform(-0.5 * side, 0.5 * side, 2)
@@ -207,7 +207,7 @@ class VFormation(SavedAttributes, Node):
             width = math.ceil(math.sqrt(count))
             found = [np.array([k % width, k // width], float) * _APART for k in range(count)]
         along = np.argsort(offsets[:, 0], kind="stable")
-        drawn = np.array(sorted(found, key=lambda place: float(place[0])))
+        drawn = np.array(sorted(found, key=lambda position: float(position[0])))
         placed = np.empty((count, 2))
         placed[along] = drawn
         return placed
@@ -266,12 +266,12 @@ class VFormation(SavedAttributes, Node):
         if search is None or now_ns < self._step_ns:
             return
         if not has_ended:
-            if self._lead:  # straight ways of unlike velocities: the plan would begin elsewhere
-                self._lead = min(2 * self._lead, _MOST_LEAD)
+            if self._lead:  # straight paths of unlike velocities: the plan would begin elsewhere
+                self._lead = min(2 * self._lead, _MAX_LEAD)
                 self._begin_search(now_ns, "the search has used up its time")
             return
         plan = search.plan()
-        if not plan.is_solved and self._num_kicks < _MOST_KICKS:
+        if not plan.is_solved and self._num_kicks < _MAX_KICKS:
             self._kick()
             self._begin_search(now_ns, f"no plan ends in a V: cost {plan.cost:.2g}")
             return
@@ -283,13 +283,15 @@ class VFormation(SavedAttributes, Node):
         self._num_kicks += 1
         rng = np.random.default_rng([self._seed, 2, self._num_searches])
         rows, steps = self._team.members, max(1, self._lead)
-        least = self._settings.limits.min_distance
+        min_distance = self._settings.limits.min_distance
         before, kept = self._flock(0), self._velocity[self._team.members].copy()
         for _ in range(_DRAWS):
             size = rng.uniform(0.0, 0.7, len(rows)) * np.linalg.norm(kept, axis=1)
-            way = rng.uniform(-math.pi, math.pi, len(rows))
-            self._velocity[rows] = kept + (size * np.array([np.cos(way), np.sin(way)])).T
-            if approach_margin(before, self._flock(steps), least) >= 0.0:
+            direction = rng.uniform(-math.pi, math.pi, len(rows))
+            self._velocity[rows] = (
+                kept + (size * np.array([np.cos(direction), np.sin(direction)])).T
+            )
+            if approach_margin(before, self._flock(steps), min_distance) >= 0.0:
                 return
         self._velocity[rows] = kept
 
@@ -329,9 +331,9 @@ class VFormation(SavedAttributes, Node):
         rows = np.array(self._team.members)
         position, _ = self._team.motion()
         offset = np.abs(position - self._bird[rows]).max(axis=1)
-        displaced = offset > _DISPLACED * self._span
-        self._bird[rows[displaced]] = position[displaced]
-        if lost or displaced.any():
+        is_displaced = offset > _MAX_OFFSET * self._span
+        self._bird[rows[is_displaced]] = position[is_displaced]
+        if lost or is_displaced.any():
             self._restart_search(now_ns, f"{lost} left" if lost else "a UAV was displaced")
 
     def _steer(self) -> None:

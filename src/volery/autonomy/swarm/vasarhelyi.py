@@ -52,8 +52,8 @@ class Vasarhelyi:
 
     def __init__(self, settings: VasarhelyiSettings | None = None) -> None:
         self.settings = chosen = settings or VasarhelyiSettings()
-        reach = (chosen.max_speed_m_s * 2.0) ** 2 / (2.0 * chosen.friction_acceleration_m_s2)
-        self.radius_m = max(chosen.repulsion_m, chosen.friction_m + reach)
+        braking_m = (chosen.max_speed_m_s * 2.0) ** 2 / (2.0 * chosen.friction_acceleration_m_s2)
+        self.radius_m = max(chosen.repulsion_m, chosen.friction_m + braking_m)
 
     def velocities(self, flock: Flock, preferred: Array, around: Surroundings) -> Array:
         """Returns commanded velocities (N, 2) m/s."""

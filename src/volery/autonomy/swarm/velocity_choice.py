@@ -26,7 +26,7 @@ def give_way(
     i: int,
     near: Any,
     distance_m: float,
-    way_s: float,
+    give_way_s: float,
     step_s: float,
     limit: float,
     planes: Any,
@@ -48,7 +48,7 @@ def give_way(
             vx - ux,
             vy - uy,
             distance_m,
-            way_s,
+            give_way_s,
             step_s,
         )
         planes[found, 0], planes[found, 1], planes[found, 2] = nx, ny, nx * vx + ny * vy + change
@@ -109,8 +109,8 @@ def _nearest(planes: Any, end: int, vx: float, vy: float, limit: float) -> tuple
             continue
         if abs(c) > limit:  # the border is out of reach
             return k, x, y
-        reach = math.sqrt(limit * limit - c * c)
-        low, high = -reach, reach
+        half_length = math.sqrt(limit * limit - c * c)
+        low, high = -half_length, half_length
         for j in range(k):  # the border is c n + t (-ny, nx)
             along = planes[j, 1] * nx - planes[j, 0] * ny
             missing = planes[j, 2] - c * (planes[j, 0] * nx + planes[j, 1] * ny)

@@ -10,7 +10,7 @@ from volery.autonomy.swarm.ares import AresSettings
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import formation_fitness
 from volery.autonomy.swarm.formation_search import plan_formation
-from volery.autonomy.swarm.joining import way_into
+from volery.autonomy.swarm.joining import trajectory_into
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
@@ -25,8 +25,8 @@ def formation_search() -> None:
     velocities = np.full((3, 2), 0.5)
     formation_fitness(positions, velocities)
     plan_formation(positions, velocities, settings=AresSettings(num_clones=1, num_levels=1))
-    start, others, way = np.ones(4), np.zeros((2, 2, 1)), np.empty((2, 4))
-    way_into(start, start[:2], start[:2], others, FlockLimits(), np.uint64(1), 0, way)
+    start, others, trajectory = np.ones(4), np.zeros((2, 2, 1)), np.empty((2, 4))
+    trajectory_into(start, start[:2], start[:2], others, FlockLimits(), np.uint64(1), 0, trajectory)
     flock = np.zeros((4, 3))
     approach_margin(flock, flock, 1.0)
 

@@ -28,7 +28,7 @@ class SectorClaim(NamedTuple):
 class Worker(NamedTuple):
     """A UAV that searches or could search."""
 
-    place: Array
+    position: Array
     """(2,) m, map."""
     sector: int
     """Current sector; -1: none."""
@@ -49,8 +49,8 @@ def assign(workers: Mapping[str, Worker], searched: Mask, centres: Array) -> dic
     if not free or not idle:
         return {}
     names = sorted(workers)
-    places = np.array([workers[name].place for name in names])
-    away = np.linalg.norm(places[:, None, :] - centres[None, free, :], axis=2)
+    positions = np.array([workers[name].position for name in names])
+    away = np.linalg.norm(positions[:, None, :] - centres[None, free, :], axis=2)
     nearest = away.min(axis=0)
     pairs = sorted(
         (float(2.0 * away[row, k] - nearest[k]), name, sector)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.perception.map_frame import UNKNOWN_PLACE, MapFrame
+from volery.autonomy.perception.map_frame import UNKNOWN_POSE, MapFrame
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.autonomy.team.assignment import Worker
@@ -134,7 +134,7 @@ class TeamMember(SavedAttributes):
         """Returns what an operator should know, in words; empty: nothing."""
         now, found = self._now_ns, []
         if now - self.pose_ns > POSE_TIMEOUT_S * NS_PER_S:
-            found.append(UNKNOWN_PLACE if self._frame.is_lost else "no odometry")
+            found.append(UNKNOWN_POSE if self._frame.is_lost else "no odometry")
         silent = sorted(
             name
             for name, mate in self.team.mates.items()
@@ -175,7 +175,7 @@ class TeamMember(SavedAttributes):
     def publish_status(self, problem: str) -> None:
         """Publishes the state of the search for operators."""
         now = self._now_ns
-        heard = [name for name, _ in self.team.recent(now, self._settings.timeout_s)]
+        teammates = [name for name, _ in self.team.recent(now, self._settings.timeout_s)]
         self._status.publish(
             self._status_type(
                 header(now, "map"),
@@ -183,7 +183,7 @@ class TeamMember(SavedAttributes):
                 self.sector,
                 int(self.searched.sum()),
                 len(self.searched),
-                heard,
+                teammates,
                 len(self.targets.targets()),
                 problem,
             )
@@ -220,13 +220,13 @@ class TeamMember(SavedAttributes):
             self._publish_targets()
 
     def _on_detections(self, message: Any) -> None:
-        known = len(self.targets.finds)
+        known = len(self.targets.detections)
         detections = [Detection.from_message(each) for each in message.targets]
         if self.targets.take(d._replace(finder=self._settings.name) for d in detections):
             self._publish_targets()
-        if len(self.targets.finds) > known:
+        if len(self.targets.detections) > known:
             self.publish_report()  # at once: the team needs it within a second
 
     def _publish_targets(self) -> None:
-        found = [find.message() for find in self.targets.targets()]
+        found = [detection.message() for detection in self.targets.targets()]
         self._found.publish(self._targets_type(header(self._now_ns, "map"), found))

@@ -24,7 +24,7 @@ def polygon_of(area: Area | None, z: float, time_ns: int) -> PolygonStamped:
     return PolygonStamped(header(time_ns, "map"), Polygon(points))
 
 
-def goal_at(place: Array, time_ns: int) -> PoseStamped:
-    """Returns a goal at `place` (3,) m with any heading."""
+def goal_at(position: Array, time_ns: int) -> PoseStamped:
+    """Returns a goal at `position` (3,) m with any heading."""
     level = Quaternion(0.0, 0.0, 0.0, 1.0)
-    return PoseStamped(header(time_ns, "map"), Pose(Point(*place.tolist()), level))
+    return PoseStamped(header(time_ns, "map"), Pose(Point(*position.tolist()), level))

@@ -39,7 +39,7 @@ class PositionUncertainty(NamedTuple):
     """Angular error of the ray: pixels, attitude, time."""
     slope: float = 0.2
     """Rise or fall of the ground for each metre of distance."""
-    place_m: float = 0.2
+    position_m: float = 0.2
     """Error of the UAV's own position, m."""
 
 
@@ -47,24 +47,24 @@ class Observation(NamedTuple):
     """A single observation of an object."""
 
     time_ns: int
-    place: Array
+    position: Array
     """(3,) m, map."""
     covariance: Array
     """(2, 2) of x and y, m^2."""
 
 
 def sighting_of(
-    time_ns: int, eye: Array, place: Array, uncertainty: PositionUncertainty
+    time_ns: int, eye: Array, position: Array, uncertainty: PositionUncertainty
 ) -> Observation:
-    """Returns the observation of an object: a ray from `eye` (3,) to `place` (3,) below it."""
-    offset = place[:2] - eye[:2]
-    r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - place[2])
+    """Returns the observation of an object: a ray from `eye` (3,) to `position` (3,) below it."""
+    offset = position[:2] - eye[:2]
+    r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - position[2])
     along = math.hypot((r * r + h * h) / h * uncertainty.angle_rad, uncertainty.slope * r * r / h)
     across = r * uncertainty.angle_rad
     c, s = offset / r
     turn = np.array([[c, -s], [s, c]])
-    own = uncertainty.place_m**2 * np.eye(2)
-    return Observation(time_ns, place, turn @ np.diag([along**2, across**2]) @ turn.T + own)
+    own = uncertainty.position_m**2 * np.eye(2)
+    return Observation(time_ns, position, turn @ np.diag([along**2, across**2]) @ turn.T + own)
 
 
 @dataclass
@@ -86,7 +86,7 @@ class Track:
         return np.asarray(np.linalg.inv(self.information))
 
     @property
-    def place(self) -> Array:
+    def position(self) -> Array:
         """Position (2,) m, map."""
         return np.asarray(self.covariance @ self.weighted)
 
@@ -94,21 +94,21 @@ class Track:
         """Adds an observation."""
         weight = np.linalg.inv(sighting.covariance)
         self.information = self.information + weight
-        self.weighted = self.weighted + weight @ sighting.place[:2]
-        self.heights += float(sighting.place[2])
+        self.weighted = self.weighted + weight @ sighting.position[:2]
+        self.heights += float(sighting.position[2])
         self.count += 1
         self.last_ns = sighting.time_ns
 
     def fits(self, sighting: Observation) -> bool:
         """Returns whether an observation may belong to this object."""
-        off = sighting.place[:2] - self.place
+        off = sighting.position[:2] - self.position
         spread = np.linalg.inv(self.covariance + sighting.covariance)
         return float(off @ spread @ off) <= _GATE or float(np.hypot(*off)) <= _NEAR_M
 
-    def find(self, finder: str) -> Detection:
+    def detection(self, finder: str) -> Detection:
         """Returns the detection that other UAVs receive."""
         a, b, c, d = self.covariance.ravel().tolist()
-        x, y = self.place.tolist()
+        x, y = self.position.tolist()
         z = self.heights / self.count
         return Detection(finder, self.number, self.last_ns, (x, y, z), (a, b, c, d), self.count)
 
@@ -136,8 +136,8 @@ class Tracks:
         ]
         fitting = [track for track in self.tracks if track.fits(sighting)]
         if fitting:
-            place = sighting.place[:2]
-            track = min(fitting, key=lambda t: float(np.hypot(*(t.place - place))))
+            position = sighting.position[:2]
+            track = min(fitting, key=lambda t: float(np.hypot(*(t.position - position))))
         else:
             track = Track(now, now)
             self.tracks.append(track)
@@ -146,10 +146,10 @@ class Tracks:
             track.number = 1 + max(each.number for each in self.tracks)
         return track
 
-    def finds(self, finder: str) -> list[Detection]:
+    def detections(self, finder: str) -> list[Detection]:
         """Returns all confirmed detections, by number."""
         sure = sorted((t for t in self.tracks if t.number), key=lambda t: t.number)
-        return [track.find(finder) for track in sure]
+        return [track.detection(finder) for track in sure]
 
     def _is_sure(self, track: Track) -> bool:
         lasted = track.last_ns - track.first_ns >= self.within_s * NS_PER_S

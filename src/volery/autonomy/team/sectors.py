@@ -71,14 +71,14 @@ class Coverage:
         )
 
     @property
-    def share(self) -> float:
+    def covered_fraction(self) -> float:
         """Observed fraction of the sector."""
         return float(self.seen.mean())
 
-    def look(self, place: Array, sight_m: float) -> int:
-        """Marks cells within `sight_m` of `place` (2,) m; returns the number of new cells."""
+    def look(self, position: Array, sight_m: float) -> int:
+        """Marks cells within `sight_m` of `position` (2,) m; returns the number of new cells."""
         x, y = self._middles
-        near = np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= sight_m
+        near = np.hypot(x[None, :] - position[0], y[:, None] - position[1]) <= sight_m
         new = int((near & ~self.seen).sum())
         self.seen |= near
         return new

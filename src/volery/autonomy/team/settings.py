@@ -37,10 +37,14 @@ class TeamSettings:
     def declare(cls, node: Node) -> TeamSettings:
         """Declares and reads the parameters of a node. Raises GraphError for invalid values."""
 
-        def number(name: str, default: float, least: float, most: float = math.inf) -> float:
+        def number(name: str, default: float, minimum: float, maximum: float = math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
-            if not (math.isfinite(value) and least <= value <= most):
-                within = f"{least:g} to {most:g}" if math.isfinite(most) else f"at least {least:g}"
+            if not (math.isfinite(value) and minimum <= value <= maximum):
+                within = (
+                    f"{minimum:g} to {maximum:g}"
+                    if math.isfinite(maximum)
+                    else f"at least {minimum:g}"
+                )
                 raise GraphError(f"task_manager: {name} must be {within}, not {value}")
             return value
 

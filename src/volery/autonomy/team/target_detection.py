@@ -118,9 +118,9 @@ class TargetDetection(SavedAttributes, Node):
 
     def _on_report(self, report: Any) -> None:
         p = report.position
-        place = np.array([p.x, p.y, p.z])
-        if np.isfinite(place).all():
-            self._mates[report.name] = (self.get_clock().now_ns(), place)
+        position = np.array([p.x, p.y, p.z])
+        if np.isfinite(position).all():
+            self._mates[report.name] = (self.get_clock().now_ns(), position)
 
     def _on_image(self, image: Image) -> None:
         taken = stamp_of(image)
@@ -131,21 +131,21 @@ class TargetDetection(SavedAttributes, Node):
         view = GroundView(self._intrinsics, self._mount.tolist(), self._turn)
         hidden = self._teammates_in(view, pose)
         blob = largest_blob(colour_mask(pixels_of(image), self._colours, hidden))
-        if blob is None or blob.share < self._min_fraction:
+        if blob is None or blob.fraction < self._min_fraction:
             return
-        place = view.place_of(blob.u, blob.v, pose, ground + self._object_height_m)
-        if place is None or np.hypot(*(place - pose.position)[:2]) > self._max_range_m:
+        position = view.position_of(blob.u, blob.v, pose, ground + self._object_height_m)
+        if position is None or np.hypot(*(position - pose.position)[:2]) > self._max_range_m:
             return
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
-        track = self._tracks.add(sighting_of(taken, eye, place, self._uncertainty))
+        track = self._tracks.add(sighting_of(taken, eye, position, self._uncertainty))
         if track.number:
             self._publish_targets(taken)
 
     def _teammates_in(self, view: GroundView, pose: OdometrySample) -> Array:
         """Returns the image discs (K, 3) of teammates, which may have the colour."""
         since = pose.time_ns - round(_MATE_S * NS_PER_S)
-        near = [place for received_ns, place in self._mates.values() if received_ns >= since]
-        discs = [view.disc_of(place, _MATE_M, pose) for place in near]
+        near = [position for received_ns, position in self._mates.values() if received_ns >= since]
+        discs = [view.disc_of(position, _MATE_M, pose) for position in near]
         return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
 
     def _ground_z(self, time_ns: int) -> float | None:
@@ -161,5 +161,5 @@ class TargetDetection(SavedAttributes, Node):
 
     def _publish_targets(self, time_ns: int) -> None:
         finder = self.get_namespace().strip("/")
-        finds = [find.message() for find in self._tracks.finds(finder)]
-        self._targets.publish(self._type(header(time_ns, "map"), finds))
+        detections = [detection.message() for detection in self._tracks.detections(finder)]
+        self._targets.publish(self._type(header(time_ns, "map"), detections))

@@ -12,11 +12,11 @@ from volery.core.clock import NS_PER_S
 from volery.graph.messages import Point, header, message_type, stamp_of
 
 TYPE = "volery_interfaces/msg/Target"
-_TOLD = 2
+_NUM_REPORTED = 2
 """Number of newest detections, and of others, in a report. Modelling choice."""
 _END_NS = 2**31 * NS_PER_S
 """End of what `builtin_interfaces/Time` can hold; a large `nanosec` can carry a stamp beyond it."""
-_LEAST_M = 0.1
+_MIN_M = 0.1
 """Smallest standard deviation of a position: maps of two UAVs differ. Modelling choice."""
 
 
@@ -26,7 +26,7 @@ class Detection(NamedTuple):
     finder: str
     number: int
     stamp_ns: int
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     """(3,) m, map."""
     covariance: tuple[float, float, float, float]
     """(2, 2) of x and y, row by row, m^2."""
@@ -52,7 +52,7 @@ class Detection(NamedTuple):
         if not 0 <= self.stamp_ns < _END_NS:
             return False
         a, b, c, d = self.covariance
-        finite = bool(np.isfinite([*self.place, *self.covariance]).all())
+        finite = bool(np.isfinite([*self.position, *self.covariance]).all())
         return finite and a >= 0.0 and d >= 0.0 and a * d >= b * c
 
     def message(self) -> Any:
@@ -61,7 +61,7 @@ class Detection(NamedTuple):
             header(self.stamp_ns, "map"),
             self.finder,
             self.number,
-            Point(*self.place),
+            Point(*self.position),
             np.array(self.covariance),
             self.sightings,
         )
@@ -75,17 +75,17 @@ class TargetList:
     """
 
     gate_m: float
-    finds: dict[tuple[str, int], Detection] = field(default_factory=dict)
+    detections: dict[tuple[str, int], Detection] = field(default_factory=dict)
 
-    def take(self, finds: Iterable[Detection]) -> bool:
+    def take(self, detections: Iterable[Detection]) -> bool:
         """Adds detections; returns whether one of them was new."""
         changed = False
-        for find in finds:
-            if not find.is_sound:
+        for detection in detections:
+            if not detection.is_sound:
                 continue
-            key = find.finder, find.number
-            if key not in self.finds or self.finds[key].stamp_ns < find.stamp_ns:
-                self.finds[key], changed = find, True
+            key = detection.finder, detection.number
+            if key not in self.detections or self.detections[key].stamp_ns < detection.stamp_ns:
+                self.detections[key], changed = detection, True
         return changed
 
     def changed(self, turn: int) -> list[Any]:
@@ -94,23 +94,26 @@ class TargetList:
         A report with all of them would fill the radio's channel; after some turns all have been
         sent.
         """
-        keys = sorted(self.finds, key=lambda key: (-self.finds[key].stamp_ns, key))
-        newest, others = keys[:_TOLD], sorted(keys[_TOLD:])
-        first = turn * _TOLD % max(len(others), 1)
-        in_turn = (others[first:] + others[:first])[:_TOLD]
-        return [self.finds[key].message() for key in (*newest, *in_turn)]
+        keys = sorted(self.detections, key=lambda key: (-self.detections[key].stamp_ns, key))
+        newest, others = keys[:_NUM_REPORTED], sorted(keys[_NUM_REPORTED:])
+        first = turn * _NUM_REPORTED % max(len(others), 1)
+        in_turn = (others[first:] + others[:first])[:_NUM_REPORTED]
+        return [self.detections[key].message() for key in (*newest, *in_turn)]
 
     def targets(self) -> list[Detection]:
         """Returns one detection for each target, fused by their covariances."""
         groups: list[list[Detection]] = []
-        for key in sorted(self.finds):
-            find = self.finds[key]
+        for key in sorted(self.detections):
+            detection = self.detections[key]
             for group in groups:
-                if np.hypot(*np.subtract(find.place[:2], group[0].place[:2])) <= self.gate_m:
-                    group.append(find)
+                if (
+                    np.hypot(*np.subtract(detection.position[:2], group[0].position[:2]))
+                    <= self.gate_m
+                ):
+                    group.append(detection)
                     break
             else:
-                groups.append([find])
+                groups.append([detection])
         return [_joined(group) for group in groups]
 
 
@@ -119,17 +122,17 @@ def _joined(group: list[Detection]) -> Detection:
     if len(group) == 1:
         return group[0]
     information, weighted, height = np.zeros((2, 2)), np.zeros(2), 0.0
-    for find in group:
-        weight = np.linalg.inv(np.reshape(find.covariance, (2, 2)) + _LEAST_M**2 * np.eye(2))
+    for detection in group:
+        weight = np.linalg.inv(np.reshape(detection.covariance, (2, 2)) + _MIN_M**2 * np.eye(2))
         information += weight
-        weighted += weight @ find.place[:2]
-        height += find.place[2] / len(group)
+        weighted += weight @ detection.position[:2]
+        height += detection.position[2] / len(group)
     covariance = np.linalg.inv(information)
     x, y = covariance @ weighted
     a, b, c, d = covariance.ravel().tolist()
     return group[0]._replace(
-        stamp_ns=max(find.stamp_ns for find in group),
-        place=(float(x), float(y), float(height)),
+        stamp_ns=max(detection.stamp_ns for detection in group),
+        position=(float(x), float(y), float(height)),
         covariance=(a, b, c, d),
-        sightings=sum(find.sightings for find in group),
+        sightings=sum(detection.sightings for detection in group),
     )

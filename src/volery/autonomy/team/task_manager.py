@@ -345,7 +345,7 @@ class TaskManager(SavedAttributes, Node):
         member = self.member
         assert member.coverage is not None
         claim = SectorClaim(member.since_ns, self.settings.name)
-        if member.coverage.share >= self.settings.coverage_fraction:
+        if member.coverage.covered_fraction >= self.settings.coverage_fraction:
             member.searched[member.sector] = True
             self._drop(now)
         elif member.searched[member.sector] or must_yield(

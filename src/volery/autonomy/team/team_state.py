@@ -86,9 +86,9 @@ class TeamState:
             since_ns,
             from_bits(report.given_up, self.sectors),
         )
-        place = np.array([p.x, p.y, p.z])
+        position = np.array([p.x, p.y, p.z])
         self.mates[report.name] = TeamMate(
-            MissionPhase(report.phase), sent_ns, now_ns, worker, place
+            MissionPhase(report.phase), sent_ns, now_ns, worker, position
         )
         return True
 

@@ -18,7 +18,7 @@ from volery.core.errors import RecordingError
 _METADATA = "metadata.yaml"
 _MAX_METADATA_BYTES = 4 << 20
 _PIECE_BYTES = 1 << 20
-_MOST_NAMES = 10
+_MAX_NAMES = 10
 """Files that an error lists."""
 
 
@@ -39,12 +39,12 @@ class BagFiles:
         self._folder = ""
         self._closing: weakref.finalize[Any, Any] | None = None
         budget = UnpackingBudget(path, bag_size(path))
-        files, lost, doubt = _files_of(path)
+        files, lost, warning = _files_of(path)
         try:
             for file in files:
                 self._add(file, budget)
-            if lost or (doubt and self.sqlite):  # MCAP files describe themselves
-                self._problems.insert(0, lost or doubt)
+            if lost or (warning and self.sqlite):  # MCAP files describe themselves
+                self._problems.insert(0, lost or warning)
             if not self.mcap and not self.sqlite:
                 raise RecordingError(self.problem)
         except BaseException:
@@ -138,7 +138,7 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
     """
     if not path.is_dir():
         return [path], "", ""
-    names, doubt = _listed(path / _METADATA)
+    names, warning = _listed(path / _METADATA)
     files = [path / name for name in names]
     missing = [file.name for file in files if not file.is_file()]
     if files and not missing:
@@ -150,7 +150,7 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
         others, present = present, [file for file in files if file.is_file()]
         if not present:
             raise RecordingError(
-                f"{path}: {doubt or f'{_METADATA} names others'}, and the names of its files are "
+                f"{path}: {warning or f'{_METADATA} names others'}, and the names of its files are "
                 f"not those of one bag ({path.name}_0, {path.name}_1): {_some(others)}; name one "
                 "of them"
             )
@@ -159,13 +159,13 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
         lost = f"{_METADATA} names files that are missing: {', '.join(missing)}{instead}"
         return present, lost, ""
     if len(present) > 1 and not is_named_after(present, path):
-        return present, f"{doubt}; read as one bag: {_some(present)}", ""
-    return present, "", doubt + instead
+        return present, f"{warning}; read as one bag: {_some(present)}", ""
+    return present, "", warning + instead
 
 
 def _some(files: list[Path]) -> str:
-    more = f" and {len(files) - _MOST_NAMES} more" if len(files) > _MOST_NAMES else ""
-    return ", ".join(file.name for file in files[:_MOST_NAMES]) + more
+    more = f" and {len(files) - _MAX_NAMES} more" if len(files) > _MAX_NAMES else ""
+    return ", ".join(file.name for file in files[:_MAX_NAMES]) + more
 
 
 def _listed(file: Path) -> tuple[list[str], str]:

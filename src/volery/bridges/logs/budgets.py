@@ -45,16 +45,16 @@ class UnpackingBudget:
 
     def __init__(self, path: Path, size: int) -> None:
         self._path = path
-        self._most = _FREE_BYTES + _MAX_RATIO * size
+        self._max_bytes = _FREE_BYTES + _MAX_RATIO * size
         self._spent = 0
 
     def spend(self, count: int) -> None:
         """Counts unpacked bytes. Raises `RecordingError` if there are too many."""
         self._spent += count
-        if self._spent > self._most:
+        if self._spent > self._max_bytes:
             raise RecordingError(
-                f"{self._path}: unpacks to more than {self._most / 1e9:.1f} GB, more than any log "
-                "of its size does; the rest is not read"
+                f"{self._path}: unpacks to more than {self._max_bytes / 1e9:.1f} GB, more than any "
+                "log of its size does; the rest is not read"
             )
 
 

@@ -89,7 +89,9 @@ class ChunkedLog(ABC):
         self._records = 0
         try:
             self._scan()
-            self.chunks = [chunk for found in self._found if (chunk := self._told(found)).counts]
+            self.chunks = [
+                chunk for found in self._found if (chunk := self._with_counts(found)).counts
+            ]
             self._learn_channels()
         except BaseException:
             self.close()
@@ -181,7 +183,7 @@ class ChunkedLog(ABC):
         kept = sum(content.memory_bytes for content in self._kept.values())
         return len(self._kept) > _CHUNKS_KEPT or kept > KEPT_BYTES
 
-    def _told(self, found: Chunk | Unindexed) -> Chunk:
+    def _with_counts(self, found: Chunk | Unindexed) -> Chunk:
         """Returns the chunk with its times and counts, which are read if the index lacks them."""
         if isinstance(found, Chunk):
             return found

@@ -126,13 +126,13 @@ def _types_of(topic: LogTopic) -> _Types | GraphError:
         is_known = name in typestore().types
         if is_known and is_ros1 and topic.digest == ros1_codec().md5(name):
             return _Types(name, name)
-        logged, doubt = learn_type(name, topic)
-        if doubt and is_ros1 and topic.digest:
+        logged, problem = learn_type(name, topic)
+        if problem and is_ros1 and topic.digest:
             ours = ros1_codec().md5(name)
             if ours != topic.digest:
                 raise GraphError(
                     f"the log's {name} differs from the local one (md5 {topic.digest}, not {ours})"
-                    f", and its own definition cannot be used: {doubt}"
+                    f", and its own definition cannot be used: {problem}"
                 )
         is_local = is_known and logged != name and is_part_of(logged, name)
     except GraphError as error:

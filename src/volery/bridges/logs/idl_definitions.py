@@ -19,7 +19,7 @@ _INCLUDE = re.compile(r"^[ \t]*#[^\n]*$", re.MULTILINE)
 """Lines for the preprocessor, which the parser does not know; all types are in the schema."""
 _LONGEST = 60_000
 """Limit of a schema, characters."""
-_MOST_NOTES = 2000
+_MAX_NOTES = 2000
 """Limit of annotations, such as `@unit`: the parser's time grows with their number squared."""
 _DEEPEST = 50
 """Limit of nested brackets; the parser calls itself for each."""
@@ -30,9 +30,9 @@ def msg_texts(definition: str) -> dict[str, str]:
 
     Raises `GraphError` if a definition is invalid, or has parts that ROS messages lack.
     """
-    if len(definition) > _LONGEST or definition.count("@") > _MOST_NOTES:
+    if len(definition) > _LONGEST or definition.count("@") > _MAX_NOTES:
         raise GraphError(
-            f"a definition in IDL has more than {_LONGEST} characters or {_MOST_NOTES} annotations"
+            f"a definition in IDL has more than {_LONGEST} characters or {_MAX_NOTES} annotations"
         )
     texts: dict[str, str] = {}
     for part in _PART.split(definition):

@@ -42,7 +42,7 @@ class LearnedType(NamedTuple):
     """The type that decodes a topic's bytes."""
 
     name: str
-    doubt: str
+    problem: str
     """Why it is not from the log's definition; empty if it is."""
 
 

@@ -72,8 +72,8 @@ class McapChunks(ChunkedLog):
             self._chunk = span
         elif opcode in mcap_format.DEFINITIONS:
             begin = span.position + _HEAD.size
-            most = min(span.length - _HEAD.size, MAX_DEFINITION_BYTES + 1)
-            self._learn(opcode, self._read(begin, most))
+            length = min(span.length - _HEAD.size, MAX_DEFINITION_BYTES + 1)
+            self._learn(opcode, self._read(begin, length))
 
     def _index(self, span: Span) -> None:
         """Reads the times of one channel in the current chunk.

@@ -62,7 +62,7 @@ class Playback:
         """Time of the log's own clock there; during a publication, the message's time."""
         self.refused: dict[str, str] = {}
         """Topics that cannot be played, and why not."""
-        self._place = TimelinePosition(0, 0)
+        self._timeline_position = TimelinePosition(0, 0)
         self._decoder = LogDecoder()
         self._publishers: dict[int, Publisher] = {}
         self._is_latched = topic_filter(LATCHED)
@@ -118,7 +118,9 @@ class Playback:
         Returns whether all were published.
         """
         until_ns = min(until_ns, self.end_ns)
-        shown, self._place, over = self._line.take(self._place, until_ns, self._wanted())
+        shown, self._timeline_position, over = self._line.take(
+            self._timeline_position, until_ns, self._wanted()
+        )
         self._publish(shown)
         reached_ns = until_ns if over else shown[-1].time_ns if shown else self.position_ns
         self.position_ns = max(self.position_ns, reached_ns)
@@ -129,9 +131,9 @@ class Playback:
         """Seeks to a time within the log and publishes the state of that time."""
         self.position_ns = min(max(time_ns, self.start_ns), self.end_ns)
         if self.position_ns == self.start_ns:
-            self._place = TimelinePosition(0, 0)
+            self._timeline_position = TimelinePosition(0, 0)
         else:
-            self._place = self._line.after(self.position_ns)
+            self._timeline_position = self._line.after(self.position_ns)
         self._show(self._wanted())
         self._set_clock()
 
@@ -159,12 +161,12 @@ class Playback:
         """Publishes the last messages of `channels` before the current position."""
         states = {c for c in channels if not self._happens(self._publishers[c].topic)}
         moving = {c for c in states if self._is_transform(c)}
-        shown = self._line.last_before(self._place, states - moving)
-        shown += self._line.since(self._place, self.position_ns - _TF_NS, moving)
+        shown = self._line.last_before(self._timeline_position, states - moving)
+        shown += self._line.since(self._timeline_position, self.position_ns - _TF_NS, moving)
         self._publish(shown)
 
     def _set_clock(self) -> None:
-        self.now_ns = self.position_ns - self._line.shift_ns(self._place)
+        self.now_ns = self.position_ns - self._line.shift_ns(self._timeline_position)
 
     def _is_transform(self, channel: int) -> bool:
         publisher = self._publishers[channel]

@@ -97,10 +97,10 @@ def read_flight(path: Path) -> RecordedFlight:
         raise RecordingError(f"{path}: {error}") from None
     finally:
         log.close()
-    for place, command in enumerate(commands):
-        if command.number != place:
+    for index, command in enumerate(commands):
+        if command.number != index:
             raise RecordingError(
-                f"{path}: command {place} is missing, so that the flight cannot be replayed: "
+                f"{path}: command {index} is missing, so that the flight cannot be replayed: "
                 "the log is damaged, or its recording started after very many commands"
             )
     return RecordedFlight(path, origin, commands, last[-1].time_ns if last else 0)

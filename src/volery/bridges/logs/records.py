@@ -283,7 +283,7 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
     """
     parts: list[bytes] = []
     begin = file.tell()
-    for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
+    for limit in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
         head = file.read(4)
         if len(head) < 4:
             return None
@@ -292,8 +292,8 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
             if begin > len(BAG_MAGIC) or not parts:
                 return None
             length = max(begin + bag_format.FIRST_BYTES - file.tell(), 0)
-        parts.append(file.read(length) if length <= most else b"")
-        if length > most:
+        parts.append(file.read(length) if length <= limit else b"")
+        if length > limit:
             file.seek(length, 1)
     return bag_fields(parts[0]), parts[1]
 

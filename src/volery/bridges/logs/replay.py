@@ -158,26 +158,26 @@ class Replay:
 
     # A restored snapshot brings back an earlier deadline: its position selects the next record.
 
-    def _go_on(self, place: _Cursor) -> None:
-        """Publishes what is due from `place` on, then waits for the next message."""
-        self._stream.seek(place.record)
+    def _go_on(self, cursor: _Cursor) -> None:
+        """Publishes what is due from `cursor` on, then waits for the next message."""
+        self._stream.seek(cursor.record)
         while (record := self._stream.peek()) is not None:
-            due_ns = self._due_ns(place.lap_ns, record)
+            due_ns = self._due_ns(cursor.lap_ns, record)
             if due_ns is not None and due_ns > self._now_ns():
-                self._wait(due_ns, _Cursor(place.lap_ns, self._stream.index))
+                self._wait(due_ns, _Cursor(cursor.lap_ns, self._stream.index))
                 return
             self._stream.advance()
             if due_ns is not None:
                 self._publish(record)
-        self._end_lap(place)
+        self._end_lap(cursor)
 
-    def _wait(self, due_ns: int, place: _Cursor) -> None:
-        self._timers.at(due_ns, partial(self._wake, place))
+    def _wait(self, due_ns: int, cursor: _Cursor) -> None:
+        self._timers.at(due_ns, partial(self._wake, cursor))
 
-    def _wake(self, place: _Cursor) -> None:
+    def _wake(self, cursor: _Cursor) -> None:
         if not self._stopped:
             self._running = True
-            self._go_on(place)
+            self._go_on(cursor)
 
     def _due_ns(self, lap_ns: int, record: LogRecord) -> int | None:
         """Returns the simulated time at which a record is published; None for never."""
@@ -204,7 +204,7 @@ class Replay:
             return
         self._published += 1
 
-    def _end_lap(self, place: _Cursor) -> None:
+    def _end_lap(self, cursor: _Cursor) -> None:
         self._laps += 1
         span_ns = self._stream.last_ns - self._stream.first_ns - self._begin_ns
         if not self._loop or self._stream.selected == 0 or span_ns < 0:
@@ -214,7 +214,7 @@ class Replay:
         # The gap between two laps is the mean gap between two messages.
         gap_ns = span_ns / (self._stream.selected - 1) if self._stream.selected > 1 else 0.0
         lap_ns = max(round((span_ns + gap_ns) / self._rate), _SHORTEST_LAP_NS)
-        next_lap = place.lap_ns + lap_ns
+        next_lap = cursor.lap_ns + lap_ns
         self._wait(next_lap, _Cursor(next_lap, 0))
 
 

@@ -62,7 +62,7 @@ class TextScans:
     left_out: int = 0
     clock_set: int = 0
     problem: str = ""
-    _most_columns: int = field(default=0, repr=False)
+    _max_columns: int = field(default=0, repr=False)
     _met: int = field(default=0, repr=False)
     """Beams with a return within the scanner's range."""
     _unit_ns: Decimal = field(init=False, repr=False)
@@ -91,22 +91,22 @@ class TextScans:
             raise RecordingError(f"{self.path}: has no scan of this layout ({reason})")
 
     @property
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Possible problems of the layout, a line each, after the log has been read."""
-        it, doubts = self.layout.ranges, []
-        unused = self._most_columns - self.layout.columns
+        it, warnings = self.layout.ranges, []
+        unused = self._max_columns - self.layout.columns
         if unused > 0:
-            doubts.append(
-                f"{counted(unused, 'column')} unused: a line has {self._most_columns:,}, the "
+            warnings.append(
+                f"{counted(unused, 'column')} unused: a line has {self._max_columns:,}, the "
                 f"layout's last one is column {self.layout.columns - 1:,}, counted from 0"
             )
-        share = self._met / max(self.scans * it.beams, 1)
-        if share < _FEW:
-            doubts.append(
+        fraction = self._met / max(self.scans * it.beams, 1)
+        if fraction < _FEW:
+            warnings.append(
                 f"{'hardly any' if self._met else 'no'} range lies between {it.range_min_m:g} and "
                 f"{it.range_max_m:g} m: is ranges.unit_m = {it.unit_m:g} right?"
             )
-        return doubts
+        return warnings
 
     def write_to(self, log: LogWriter) -> None:
         """Writes all messages to a log."""
@@ -136,7 +136,7 @@ class TextScans:
         yield _published(f"{uav}/{self.layout.topic}", time_ns, scan)
 
     def _numbers(self, words: list[str]) -> NDArray[np.float64]:
-        self._most_columns = max(self._most_columns, len(words))
+        self._max_columns = max(self._max_columns, len(words))
         if len(words) < self.layout.columns:
             found = counted(len(words), "column")
             raise ValueError(f"{found} where the layout needs {self.layout.columns}")
@@ -185,9 +185,9 @@ def _rolled(
 ) -> tuple[float, float, float]:
     """Returns the pose after its wheels have rolled these distances, m, along an arc."""
     x, y, yaw = pose
-    way, turn = 0.5 * (left + right), (right - left) / apart
+    distance, turn = 0.5 * (left + right), (right - left) / apart
     along = yaw + 0.5 * turn
-    return x + way * math.cos(along), y + way * math.sin(along), yaw + turn
+    return x + distance * math.cos(along), y + distance * math.sin(along), yaw + turn
 
 
 def _published(topic: str, time_ns: int, message: Any) -> Published:
@@ -197,10 +197,10 @@ def _published(topic: str, time_ns: int, message: Any) -> Published:
 def _scan(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> LaserScan:
     """Converts a row to a LaserScan by REP 117: inf no return, -inf too near, NaN unmeasured."""
     it = layout.ranges
-    told = row[it.first_column : it.first_column + it.beams]
-    ranges = told * it.unit_m
+    raw = row[it.first_column : it.first_column + it.beams]
+    ranges = raw * it.unit_m
     ranges[ranges < it.range_min_m] = -math.inf
-    ranges[(ranges > it.range_max_m) | np.isin(told, it.no_echo)] = math.inf
+    ranges[(ranges > it.range_max_m) | np.isin(raw, it.no_echo)] = math.inf
     low, high = math.radians(it.angle_min_deg), math.radians(it.angle_max_deg)
     values = ranges.astype(np.float32)
     values.flags.writeable = False
@@ -222,8 +222,8 @@ def _odometry(layout: TextLayout, time_ns: int, x: float, y: float, yaw: float) 
     message: Odometry = zero_message("nav_msgs/msg/Odometry")
     message.header = header(time_ns, f"{layout.uav}/odom")
     message.child_frame_id = f"{layout.uav}/base_link"
-    place, attitude = message.pose.pose.position, message.pose.pose.orientation
-    place.x, place.y = x, y
+    position, attitude = message.pose.pose.position, message.pose.pose.orientation
+    position.x, position.y = x, y
     attitude.z, attitude.w = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
     return message
 

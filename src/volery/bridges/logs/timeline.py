@@ -55,7 +55,7 @@ class Passage(NamedTuple):
     """Some messages, the position after them, and whether they were the last ones there."""
 
     shown: list[Shown]
-    place: TimelinePosition
+    position: TimelinePosition
     over: bool
 
 
@@ -74,30 +74,30 @@ class Timeline:
         """Position after the last message."""
         return TimelinePosition(len(self._pieces), 0)
 
-    def shift_ns(self, place: TimelinePosition) -> int:
+    def shift_ns(self, position: TimelinePosition) -> int:
         """Returns the offset of the line to the log's own time, before a position."""
-        number = min(place.piece, len(self._pieces) - 1)
-        at_its_start = number == place.piece and place.message <= self._pieces[number].first
+        number = min(position.piece, len(self._pieces) - 1)
+        at_its_start = number == position.piece and position.message <= self._pieces[number].first
         return self._pieces[max(number - at_its_start, 0)].shift_ns
 
     def after(self, time_ns: int) -> TimelinePosition:
         """Returns the position of the first message that is later than `time_ns`."""
         number = bisect_left(self._ends, time_ns + 1)
-        place = TimelinePosition(number, 0)
+        position = TimelinePosition(number, 0)
         for _ in range(_MAX_FRUITLESS):
-            passage = self.take(place, time_ns, frozenset())
-            place = passage.place
+            passage = self.take(position, time_ns, frozenset())
+            position = passage.position
             if passage.over:
                 break
-        return place
+        return position
 
-    def take(self, place: TimelinePosition, until_ns: int, channels: Set[int]) -> Passage:
+    def take(self, position: TimelinePosition, until_ns: int, channels: Set[int]) -> Passage:
         """Returns messages of `channels` from a position on, up to `until_ns`, at most one chunk.
 
         At most one chunk is read, even if an index announces messages that are not in it.
         """
         shown: list[Shown] = []
-        number, message = place
+        number, message = position
         while number < len(self._pieces):
             piece = self._pieces[number]
             if piece.end_ns > until_ns or not channels.isdisjoint(piece.chunk.counts):
@@ -116,12 +116,12 @@ class Timeline:
             number, message = number + 1, 0
         return Passage(shown, TimelinePosition(number, 0), over=number == len(self._pieces))
 
-    def last_before(self, place: TimelinePosition, channels: Set[int]) -> list[Shown]:
+    def last_before(self, position: TimelinePosition, channels: Set[int]) -> list[Shown]:
         """Returns the last message of each channel before a position, in the order of the log."""
         missing = set(channels)
         found: list[Shown] = []
         fruitless = 0
-        for piece, content, heads in self._backwards(place):
+        for piece, content, heads in self._backwards(position):
             if not missing or fruitless > _MAX_FRUITLESS:
                 break
             if missing.isdisjoint(piece.chunk.counts):
@@ -135,11 +135,11 @@ class Timeline:
                     found.append(Shown(head.time_ns + piece.shift_ns, head.channel, record))
         return found[::-1]
 
-    def since(self, place: TimelinePosition, time_ns: int, channels: Set[int]) -> list[Shown]:
+    def since(self, position: TimelinePosition, time_ns: int, channels: Set[int]) -> list[Shown]:
         """Returns all messages of `channels` before a position and after `time_ns`, in order."""
         found: list[Shown] = []
         fruitless = 0
-        for piece, content, heads in self._backwards(place):
+        for piece, content, heads in self._backwards(position):
             if piece.end_ns <= time_ns or fruitless > _MAX_FRUITLESS:
                 break
             if channels.isdisjoint(piece.chunk.counts):
@@ -153,18 +153,18 @@ class Timeline:
         return found[::-1]
 
     def _backwards(
-        self, place: TimelinePosition
+        self, position: TimelinePosition
     ) -> Iterator[tuple[_Piece, Callable[[], Content], Callable[[], tuple[Head, ...]]]]:
         """Yields the pieces before a position, the last one first.
 
         Each piece comes with functions for its content and heads.
         """
-        for number in range(min(place.piece, len(self._pieces) - 1), -1, -1):
+        for number in range(min(position.piece, len(self._pieces) - 1), -1, -1):
             piece = self._pieces[number]
             content = partial(self.log.content, piece.chunk)
             last = piece.last
-            if number == place.piece:
-                last = place.message if last is None else min(last, place.message)
+            if number == position.piece:
+                last = position.message if last is None else min(last, position.message)
             yield piece, content, partial(_heads, content, piece.first, last)
 
 

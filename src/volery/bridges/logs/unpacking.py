@@ -55,24 +55,24 @@ def unpack(compression: str, packed: bytes | memoryview, size: int) -> bytes:
     return data
 
 
-def _plain(packed: memoryview, most: int) -> bytes:
-    return bytes(packed[:most])
+def _plain(packed: memoryview, max_bytes: int) -> bytes:
+    return bytes(packed[:max_bytes])
 
 
-def _bz2(packed: memoryview, most: int) -> bytes:
-    return _stepwise(bz2.BZ2Decompressor(), packed, most)
+def _bz2(packed: memoryview, max_bytes: int) -> bytes:
+    return _stepwise(bz2.BZ2Decompressor(), packed, max_bytes)
 
 
-def _lz4(packed: memoryview, most: int) -> bytes:
-    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed, most)
+def _lz4(packed: memoryview, max_bytes: int) -> bytes:
+    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed, max_bytes)
 
 
-def _stepwise(decompressor: bz2.BZ2Decompressor, packed: memoryview, most: int) -> bytes:
+def _stepwise(decompressor: bz2.BZ2Decompressor, packed: memoryview, max_bytes: int) -> bytes:
     """Unpacks one frame; pieces are joined once, so that memory holds only the output."""
-    data = decompressor.decompress(packed, most)
-    if len(data) < most and not decompressor.eof:
+    data = decompressor.decompress(packed, max_bytes)
+    if len(data) < max_bytes and not decompressor.eof:
         pieces = [data]
-        left = most - len(data)
+        left = max_bytes - len(data)
         while left and not decompressor.eof:
             piece = decompressor.decompress(b"", min(left, _PIECE_BYTES))
             if not piece:
@@ -83,8 +83,8 @@ def _stepwise(decompressor: bz2.BZ2Decompressor, packed: memoryview, most: int) 
     return data
 
 
-def _zstd(packed: memoryview, most: int) -> bytes:
-    pieces, left = [], most
+def _zstd(packed: memoryview, max_bytes: int) -> bytes:
+    pieces, left = [], max_bytes
     decompressor = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES)
     with decompressor.stream_reader(packed) as reader:
         while left and (piece := reader.read(min(left, _PIECE_BYTES))):

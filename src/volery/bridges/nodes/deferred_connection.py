@@ -26,7 +26,7 @@ from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 Action = Callable[[GraphConnection], None]
 
-_MOST_PUBLISHED = 1000
+_MAX_PUBLISHED = 1000
 """Number of newest messages stored until the graph is connected (modelling choice)."""
 
 
@@ -41,7 +41,7 @@ class DeferredConnection:
         self._open_link = open_link
         self._link: GraphConnection | None = None
         self._announced: list[Action] = []
-        self._published: deque[Action] = deque(maxlen=_MOST_PUBLISHED)
+        self._published: deque[Action] = deque(maxlen=_MAX_PUBLISHED)
         self._lock = threading.RLock()
 
     def join(self) -> GraphConnection:
@@ -142,6 +142,6 @@ class _DeferredQueue(SubscriptionQueue):
         """Implements `SubscriptionQueue.failure`."""
         return None if self.real is None else self.real.failure
 
-    def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
+    def take_numbered(self, max_count: int | None = None) -> list[tuple[int, Published]]:
         """Implements `SubscriptionQueue.take_numbered`."""
-        return [] if self.real is None else self.real.take_numbered(most)
+        return [] if self.real is None else self.real.take_numbered(max_count)

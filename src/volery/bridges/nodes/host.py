@@ -209,7 +209,7 @@ class NodeHost:
         self._stopped = True
         self._woken.set()
 
-    def _pause_s(self, most_s: float) -> float:
+    def _pause_s(self, max_s: float) -> float:
         if self._simulated_ns is not None or self._kind == "simulated" or not self._alarms:
-            return most_s
-        return min(max((self._alarms[0].due_ns - self.now_ns()) / NS_PER_S, 0.0), most_s)
+            return max_s
+        return min(max((self._alarms[0].due_ns - self.now_ns()) / NS_PER_S, 0.0), max_s)

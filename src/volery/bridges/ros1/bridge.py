@@ -93,8 +93,8 @@ class Ros1Bridge:
         arguments: Any = self._address
         node = join_ros1(self._node_name, **arguments)
         self.name = f"ROS 1 node {node.name} at {node.master.uri}"
-        shares = SharedNames(self._patterns, self._commands)
-        self._bridge = GraphSync(node, gateway.open(self.name), shares)
+        names = SharedNames(self._patterns, self._commands)
+        self._bridge = GraphSync(node, gateway.open(self.name), names)
         self._keep_sim_time()
         self._bridge.offer_remote(self._remote)
         self._bridge.survey()

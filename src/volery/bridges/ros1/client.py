@@ -145,10 +145,10 @@ class Ros1Client:
             try:
                 srvtype = self._node.service_type(service)
                 wanted = f"{srvtype}_Request"
-                question = message_type(wanted)() if request is None else request
-                if type_name(type(question)) != wanted:
+                content = message_type(wanted)() if request is None else request
+                if type_name(type(content)) != wanted:
                     raise GraphError(f"service '{service}' needs {wanted}")
-                reply.answer(self._node.call(service, srvtype, question))
+                reply.answer(self._node.call(service, srvtype, content))
             except GraphError as error:
                 reply.fail(error)
             except Exception as error:  # report any error to the caller

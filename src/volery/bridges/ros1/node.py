@@ -141,8 +141,8 @@ class Ros1Node:
             address = self.master.ask("lookupService", service).removeprefix("rosrpc://")
             host, _, port = address.rstrip("/").rpartition(":")
             with socket.create_connection((host, int(port)), _HEADER_TIMEOUT_S) as connection:
-                question = {"probe": "1", "md5sum": "*", "callerid": self.name, "service": service}
-                network.write_ros_handshake_header(connection, question)
+                request = {"probe": "1", "md5sum": "*", "callerid": self.name, "service": service}
+                network.write_ros_handshake_header(connection, request)
                 buffer = self._rospy.impl.tcpros_base.BytesIO()
                 header = network.read_ros_handshake_header(connection, buffer, 4096)
             return ros2_name(header["type"], "srv")

@@ -17,8 +17,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-_MOST_MESSAGES = 1000
-_MOST_BYTES = 16 << 20
+_MAX_MESSAGES = 1000
+_MAX_BYTES = 16 << 20
 """Limits of what may wait for one subscriber; beyond, the oldest message is dropped."""
 _LENGTH = struct.Struct("<I")
 
@@ -103,7 +103,7 @@ class Reader:
         self._waiting_bytes += len(rest)
         # The first message is partly sent; the last one is the newest.
         while len(self._waiting) > 2 and (
-            len(self._waiting) > _MOST_MESSAGES or self._waiting_bytes > _MOST_BYTES
+            len(self._waiting) > _MAX_MESSAGES or self._waiting_bytes > _MAX_BYTES
         ):
             self._waiting_bytes -= len(self._waiting[1])
             del self._waiting[1]

@@ -23,7 +23,7 @@ from volery.graph.messages import message_type, time_from_ns
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
-MOST_GOALS = 1000
+MAX_GOALS = 1000
 """Stored goals of an action, with their results; beyond, the oldest finished one is removed."""
 
 _CANCELING = 3
@@ -117,7 +117,7 @@ class ActionServer:
         self._publish_status()
 
     def _make_room(self) -> bool:
-        if len(self._asked) >= MOST_GOALS:
+        if len(self._asked) >= MAX_GOALS:
             old = next((key for key, asked in self._asked.items() if asked.ended), None)
             if old is None:
                 return False
@@ -140,8 +140,8 @@ class ActionServer:
         return True
 
     def _publish_feedback(self, asked: _Asked, message: Any) -> None:
-        told = message_type(self._feedback_type)(_uuid(asked.goal_id), message)
-        self._worker.post(lambda: self._feedback.write(encode_cdr(told, self._feedback_type)))
+        feedback = message_type(self._feedback_type)(_uuid(asked.goal_id), message)
+        self._worker.post(lambda: self._feedback.write(encode_cdr(feedback, self._feedback_type)))
 
     def _end(self, asked: _Asked, status: GoalStatus, result: Any) -> None:
         asked.status = int(status)
@@ -204,8 +204,8 @@ class ActionServer:
     def _publish_status(self) -> None:
         entry = message_type("action_msgs/msg/GoalStatus")
         found = [entry(_info(asked), asked.status) for asked in self._asked.values()]
-        told = message_type("action_msgs/msg/GoalStatusArray")(found)
-        self._worker.post(lambda: self._status.write(encode_cdr(told, told.__msgtype__)))
+        status = message_type("action_msgs/msg/GoalStatusArray")(found)
+        self._worker.post(lambda: self._status.write(encode_cdr(status, status.__msgtype__)))
 
 
 class ActionServers:

@@ -38,10 +38,10 @@ _BREATH_S = 0.02
 NODE = "/volery"
 _SET = "rosapi_msgs/srv/SetParam"
 
-_taken: set[tuple[str, int, str]] = set()
+_joined: set[tuple[str, int, str]] = set()
 """Middlewares, domains and node names of the open bridges of this process: two of one would receive
 every command twice."""
-_places = threading.Lock()
+_joined_lock = threading.Lock()
 
 _log = logging.getLogger(__name__)
 
@@ -84,7 +84,7 @@ class Ros2Bridge:
         self._remote = dict(remote_services or {})
         self._shared: _Shared | None = None
         self._steward: threading.Thread | None = None
-        self._place: tuple[str, int, str] | None = None
+        self._joined_as: tuple[str, int, str] | None = None
         self._stopping = False
         self._news = threading.Event()
 
@@ -106,15 +106,15 @@ class Ros2Bridge:
             check_name(self._node_name)
         except GraphError as error:
             raise BridgeError(str(error)) from None
-        place = (self._terms.middleware, domain_of(self._terms.domain_id), self._node_name)
-        with _places:
-            if place in _taken:
+        joined = (self._terms.middleware, domain_of(self._terms.domain_id), self._node_name)
+        with _joined_lock:
+            if joined in _joined:
                 raise BridgeError(
-                    f"ROS 2 domain {place[1]} is joined already over {place[0]}, as {place[2]}"
+                    f"ROS 2 domain {joined[1]} is joined already over {joined[0]}, as {joined[2]}"
                 )
             participant = join_ros2(self._terms)
-            _taken.add(place)
-        self._place = place
+            _joined.add(joined)
+        self._joined_as = joined
         self.name = f"ROS 2 node {self._node_name}, {participant.where}"
         node = NodeName.of(self._node_name)
         session = gateway.open(self.name)
@@ -135,9 +135,9 @@ class Ros2Bridge:
         if self._shared is not None:
             self._shared.close()
             self._shared = None
-        if self._place is not None:
-            _taken.discard(self._place)
-            self._place = None
+        if self._joined_as is not None:
+            _joined.discard(self._joined_as)
+            self._joined_as = None
 
     def _watch(self) -> None:
         """Updates the shared names in both directions."""

@@ -208,10 +208,10 @@ class Ros2Client:
             try:
                 spec, caller = self._caller(service)
                 wanted = f"{spec.srvtype}_Request"
-                question = zero_message(wanted) if request is None else request
-                if type_name(type(question)) != wanted:
+                content = zero_message(wanted) if request is None else request
+                if type_name(type(content)) != wanted:
                     raise GraphError(f"service '{service}' needs {wanted}")
-                ask_server(caller, spec, question, reply)
+                ask_server(caller, spec, content, reply)
             except GraphError as error:
                 reply.fail(error)
 

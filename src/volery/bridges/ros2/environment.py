@@ -14,7 +14,7 @@ from volery.graph.nodes.imports import withdraw_ros_imports
 
 Kind = Literal["dds", "zenoh", "rclpy"]
 
-MOST_DOMAIN = 232
+MAX_DOMAIN_ID = 232
 """Largest domain: beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
 
 
@@ -66,9 +66,9 @@ def _sourced(domain_id: int) -> Participant:
 def domain_of(given: int | None) -> int:
     """Returns the given domain, or ROS_DOMAIN_ID. Raises `BridgeError` for an invalid one."""
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0" if given is None else str(given)
-    if not text.isdecimal() or int(text) > MOST_DOMAIN:
+    if not text.isdecimal() or int(text) > MAX_DOMAIN_ID:
         source = "ROS_DOMAIN_ID" if given is None else "domain id"
-        raise BridgeError(f"{source}: a number from 0 to {MOST_DOMAIN}, not '{text}'")
+        raise BridgeError(f"{source}: a number from 0 to {MAX_DOMAIN_ID}, not '{text}'")
     return int(text)
 
 

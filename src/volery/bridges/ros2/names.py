@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from volery.core.errors import GraphError
 
-MOST_CHARS = 247
+MAX_CHARS = 247
 """Longest name: RMW_TOPIC_MAX_NAME_LENGTH of rmw/validate_full_topic_name.h."""
 
 _NAME = re.compile(r"(?:/[A-Za-z_][A-Za-z0-9_]*)+", re.ASCII)
@@ -45,9 +45,9 @@ def check_name(name: str) -> None:
             f"ROS 2 does not allow the name '{name}': use ASCII "
             "letters, digits and _ between slashes, no part beginning with a digit"
         )
-    if len(name) > MOST_CHARS:
+    if len(name) > MAX_CHARS:
         raise GraphError(
-            f"ROS 2 does not allow names of more than {MOST_CHARS} characters: '{name}'"
+            f"ROS 2 does not allow names of more than {MAX_CHARS} characters: '{name}'"
         )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from volery.core.errors import GraphError
 
 _log = logging.getLogger(__name__)
-_MOST = 10_000
+_MAX_WARNINGS = 10_000
 """Number of stored warnings; beyond, none is logged."""
 
 
@@ -32,6 +32,6 @@ class WarningFilter:
 
     def warn(self, name: str, text: str) -> None:
         """Logs a warning, the first time."""
-        if (name, text) not in self._logged and len(self._logged) < _MOST:
+        if (name, text) not in self._logged and len(self._logged) < _MAX_WARNINGS:
             self._logged.add((name, text))
             _log.warning("ROS 2: %s: %s", name, text)

@@ -19,7 +19,7 @@ from volery.core.errors import BridgeError, GraphError
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
-MOST_CALLS = 1000
+MAX_CALLS = 1000
 """Calls of one peer that may be open at once."""
 
 
@@ -49,8 +49,8 @@ class Calls:
         try:
             srvtype = self._type(absolute(name), expected)
             request = payloads.decode(frame.payload, f"{srvtype}_Request")
-            if len(self._open) >= MOST_CALLS:
-                raise BridgeError(f"over {MOST_CALLS} calls at once")
+            if len(self._open) >= MAX_CALLS:
+                raise BridgeError(f"over {MAX_CALLS} calls at once")
         except (BridgeError, GraphError) as error:
             fail(error)
             return

@@ -38,7 +38,7 @@ _UNANSWERED_MS = 15_000
 
 _REFRESH_S = 0.5
 _NOTES = 100
-_MOST_REPORTS = 100
+_MAX_REPORTS = 100
 """Number of different reports; repeated errors of an endpoint do not fill a terminal."""
 _FIRST_ATTEMPT_S = 1.0
 """Time for which `start` waits for the outcome of the first attempt."""
@@ -187,7 +187,7 @@ class RosTcpConnector:
         """Stores a line, and reports it once per connection."""
         if not self._notes or self._notes[-1] != text:
             self._notes.append(text)
-        if text not in self._reported and len(self._reported) < _MOST_REPORTS:
+        if text not in self._reported and len(self._reported) < _MAX_REPORTS:
             self._reported.add(text)
             self._report(f"{self._target}: {text}")
 

@@ -20,7 +20,7 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.connection import RosTcpConnection, ServerEnd
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.session import FEATURES, EndpointSession
-from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, Generation, RosTcpFrameParser
+from volery.bridges.ros_tcp.wire import MAX_PAYLOAD_BYTES, Generation, RosTcpFrameParser
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import check_address
@@ -48,13 +48,13 @@ class RosTcpEndpoint:
         Encoding of payloads: "ros1" or "ros2". The handshake contains it.
     anywhere
         Allows a `host` beyond loopback: the protocol carries no password.
-    most_payload_bytes
+    max_payload_bytes
         A client that announces a longer payload is disconnected.
     depth
         Queue depth of each topic for a slow client; the oldest messages are dropped.
     silence_s
         Timeout of a client that has ever sent a keepalive.
-    most_clients
+    max_clients
         Largest number of clients.
 
     """
@@ -66,20 +66,20 @@ class RosTcpEndpoint:
         *,
         generation: Generation = "ros1",
         anywhere: bool = False,
-        most_payload_bytes: int = MOST_PAYLOAD_BYTES,
+        max_payload_bytes: int = MAX_PAYLOAD_BYTES,
         depth: int = DEFAULT_DEPTH,
         silence_s: float = SILENCE_S,
-        most_clients: int = 256,
+        max_clients: int = 256,
     ) -> None:
         check_address(host, anywhere=anywhere, flag="anywhere=True or --allow-remote")
         payloads_of(generation)
         self.port = port
         self._host = host
         self._generation: Generation = generation
-        self._most_payload_bytes = most_payload_bytes
+        self._max_payload_bytes = max_payload_bytes
         self._depth = depth
         self._silence_s = silence_s
-        self._most_clients = most_clients
+        self._max_clients = max_clients
         self._listener: Listener | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._clients: set[_Client] = set()
@@ -123,14 +123,14 @@ class RosTcpEndpoint:
             except OSError:  # the client is gone already
                 await asyncio.sleep(_RETRY_S)
                 continue
-            if len(self._clients) >= self._most_clients:
+            if len(self._clients) >= self._max_clients:
                 with contextlib.suppress(OSError), sock:
                     sock.send(ros_tcp.command("error", text="too many clients"))
                 continue
             name = f"ros-tcp {address[0]}:{address[1]}"
             open_session = partial(EndpointSession, gateway, name, self._generation, self._depth)
             with contextlib.suppress(OSError):  # gone already
-                parser = RosTcpFrameParser(self._most_payload_bytes)
+                parser = RosTcpFrameParser(self._max_payload_bytes)
                 _Client(sock, parser, open_session, self._clients, listener)
 
     async def _watch(self) -> None:

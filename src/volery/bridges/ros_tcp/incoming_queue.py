@@ -18,18 +18,18 @@ class IncomingQueue:
         self._session = session
         self._waiting: deque[Any] = deque(maxlen=depth)
         self._depth = depth
-        self._under_way = 0
+        self._num_pending = 0
         self._lock = threading.Lock()
         self.dropped = 0
 
     def put(self, message: Any) -> None:
         """Publishes a message, or queues it in the place of the oldest one."""
         with self._lock:
-            if self._under_way >= self._depth:
+            if self._num_pending >= self._depth:
                 self.dropped += len(self._waiting) == self._depth
                 self._waiting.append(message)
                 return
-            self._under_way += 1
+            self._num_pending += 1
         self._publish(message)
 
     def _publish(self, message: Any) -> None:
@@ -39,7 +39,7 @@ class IncomingQueue:
     def _arrived(self) -> None:
         with self._lock:
             if not self._waiting:
-                self._under_way -= 1
+                self._num_pending -= 1
                 return
             message = self._waiting.popleft()
         if self._session.published_type(self.topic) is not None:

@@ -23,7 +23,7 @@ from volery.graph.subscription_queue import SubscriptionQueue, Wake
 _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128
 """Parts per system call; Linux accepts 1024."""
-_MOST_WAITING_BYTES = 1 << 20
+_MAX_WAITING_BYTES = 1 << 20
 
 
 class _Stream:
@@ -78,7 +78,7 @@ class RosTcpOutbox:
     @property
     def crowded(self) -> bool:
         """Whether so many commands wait that no more should be caused."""
-        return self._command_bytes > _MOST_WAITING_BYTES
+        return self._command_bytes > _MAX_WAITING_BYTES
 
     def stream(
         self,

@@ -28,8 +28,8 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
 
-MOST_DEPTH = 1000
-MOST_REGISTRATIONS = 10_000
+MAX_DEPTH = 1000
+MAX_REGISTRATIONS = 10_000
 """Topics and services of one client."""
 _FIRST_REQUEST = 1001
 """First request number, as in ROS-TCP-Endpoint."""
@@ -136,8 +136,8 @@ class EndpointSession:
 
     def _subscribe(self, fields: Fields) -> None:
         name, msgtype = _name_in(fields), topic_type(text_field(fields, "message_name"))
-        if self.outbox.streams >= MOST_REGISTRATIONS:
-            raise BridgeError(f"over {MOST_REGISTRATIONS} topics")
+        if self.outbox.streams >= MAX_REGISTRATIONS:
+            raise BridgeError(f"over {MAX_REGISTRATIONS} topics")
         depth = _depth(fields, self._depth)
         reliable = fields.get("queue_size") == 0
         self.outbox.stream(name, absolute(name), msgtype, depth, reliable=reliable)
@@ -222,14 +222,14 @@ class EndpointSession:
         reply.answer(response)
 
     def _check_room(self, registered: dict[str, Any] | set[str], name: str) -> None:
-        if name not in registered and len(registered) >= MOST_REGISTRATIONS:
-            raise BridgeError(f"over {MOST_REGISTRATIONS} registrations")
+        if name not in registered and len(registered) >= MAX_REGISTRATIONS:
+            raise BridgeError(f"over {MAX_REGISTRATIONS} registrations")
 
 
 def _depth(fields: Fields, default: int) -> int:
     """Returns the depth of a client's `queue_size`; in ROS a queue of 0 loses nothing."""
     depth = number_field({"queue_size": default, **fields}, "queue_size")
-    return min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
+    return min(max(depth, 1), MAX_DEPTH) if depth else MAX_DEPTH
 
 
 def _name_in(fields: Fields) -> str:

@@ -27,7 +27,7 @@ _REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
 """Endpoints' error for each message of an unknown type."""
 _UNKNOWN = re.compile(r"Unknown (?:message|service) class '([^']+)'")
 """Endpoints' error for the registration of a type without an installed package."""
-_MOST_NAMED = 5
+_MAX_NAMED = 5
 _NOTES = ("__error", "__warn", "__log")
 
 
@@ -179,8 +179,8 @@ class UnitySession:
         names = self._registered[msgtype]
         for name in names:
             self.outbox.end_stream(name)
-        more = len(names) - _MOST_NAMED
-        listed = ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        more = len(names) - _MAX_NAMED
+        listed = ", ".join(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
         self._note(
             f"the endpoint lacks {msgtype}, which {listed} need: not shared; install "
             f"the package {msgtype.partition('/')[0]} where the endpoint runs"

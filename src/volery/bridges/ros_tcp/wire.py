@@ -32,9 +32,9 @@ REMOVE = "remove"
 """Feature: `__remove_subscriber` and similar commands are supported."""
 RESPONSE_ERROR = "response_error"
 """Feature: `__response` may have an `error`, the reason of a service's failure."""
-MOST_PAYLOAD_BYTES = 64 << 20
-MOST_DESTINATION_BYTES = 4096
-MOST_JSON_BYTES = 1 << 20
+MAX_PAYLOAD_BYTES = 64 << 20
+MAX_DESTINATION_BYTES = 4096
+MAX_JSON_BYTES = 1 << 20
 
 _VERSION = "v0.7.0"
 _LENGTH = Struct("<I")
@@ -62,13 +62,13 @@ class RosTcpFrameParser:
 
     def __init__(
         self,
-        most_payload: int = MOST_PAYLOAD_BYTES,
-        most_destination: int = MOST_DESTINATION_BYTES,
+        max_payload: int = MAX_PAYLOAD_BYTES,
+        max_destination: int = MAX_DESTINATION_BYTES,
     ) -> None:
-        if most_destination > _SCRATCH_BYTES // 4:
+        if max_destination > _SCRATCH_BYTES // 4:
             raise BridgeError(f"destinations are limited to {_SCRATCH_BYTES // 4} bytes")
-        self._most_payload = most_payload
-        self._most_destination = most_destination
+        self._max_payload = max_payload
+        self._max_destination = max_destination
         self._scratch = memoryview(bytearray(_SCRATCH_BYTES))
         self._start = 0
         self._end = 0
@@ -129,7 +129,7 @@ class RosTcpFrameParser:
     def _advance(self, frames: list[RosTcpFrame]) -> bool:
         """Reads the next part of a frame; returns False if bytes are missing."""
         if self._destination_bytes is None:
-            self._destination_bytes = self._length("destination", self._most_destination)
+            self._destination_bytes = self._length("destination", self._max_destination)
             return self._destination_bytes is not None
         if self._destination is None:
             part = self._take(self._destination_bytes)
@@ -138,7 +138,7 @@ class RosTcpFrameParser:
                 self._destination = text.rstrip("\0")
             return part is not None
         if self._payload_bytes is None:
-            self._payload_bytes = self._length("payload", self._most_payload)
+            self._payload_bytes = self._length("payload", self._max_payload)
             return self._payload_bytes is not None
         payload = self._take(self._payload_bytes)
         if payload is not None:
@@ -148,14 +148,14 @@ class RosTcpFrameParser:
             self._begin_apart(self._payload_bytes)
         return False
 
-    def _length(self, what: str, most: int) -> int | None:
+    def _length(self, what: str, limit: int) -> int | None:
         part = self._take(4)
         if part is None:
             return None
         (length,) = _LENGTH.unpack(part)
-        if length > most:
+        if length > limit:
             where = "" if self._destination is None else f" to '{self._destination[:100]}'"
-            raise BridgeError(f"a frame{where} claims a {what} of {length} bytes, over {most}")
+            raise BridgeError(f"a frame{where} claims a {what} of {length} bytes, over {limit}")
         return int(length)
 
     def _take(self, count: int) -> memoryview | None:
@@ -251,8 +251,8 @@ def read_features(fields: dict[str, Any]) -> frozenset[str]:
 
 def read_fields(payload: Bytes) -> dict[str, Any]:
     """Returns the fields of a command. Raises `BridgeError` if they are no JSON object."""
-    if len(payload) > MOST_JSON_BYTES:
-        raise BridgeError(f"{len(payload)} bytes of JSON, over {MOST_JSON_BYTES}")
+    if len(payload) > MAX_JSON_BYTES:
+        raise BridgeError(f"{len(payload)} bytes of JSON, over {MAX_JSON_BYTES}")
     try:
         fields = json.loads(str(payload, "utf-8").rstrip("\0") or "{}")
     except (ValueError, RecursionError) as error:

@@ -32,7 +32,7 @@ from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.codecs.zero import zero_message
 from volery.graph.session import Session
 
-MOST_GOALS = 1000
+MAX_GOALS = 1000
 """Open goals sent by one client, and open goals sent to it."""
 
 _UNKNOWN = 0
@@ -108,8 +108,8 @@ class RosbridgeActions:
             raise BridgeError(f"action '{name}' is a {action_type}, not {given}")
         if key in self._asked:
             raise BridgeError("send_action_goal: a goal with this 'id' is open")
-        if len(self._asked) >= MOST_GOALS:
-            raise BridgeError(f"send_action_goal: more than {MOST_GOALS} goals are open")
+        if len(self._asked) >= MAX_GOALS:
+            raise BridgeError(f"send_action_goal: more than {MAX_GOALS} goals are open")
         return action_type
 
     def _begin(self, key: Id, asked: _Asked, request: Any) -> None:
@@ -178,7 +178,7 @@ class RosbridgeActions:
     def _take(self, action: str, action_type: str, goal: Goal) -> None:
         """Sends a goal to the client."""
         acting = _Acting(action, action_type, goal)
-        if self._closed or len(self._acting) >= MOST_GOALS:
+        if self._closed or len(self._acting) >= MAX_GOALS:
             _abort(acting)
             return
         number = f"goal:{action}:{next(self._numbers)}"

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import BridgeError
 
-MOST_DEPTH = 64
+MAX_DEPTH = 64
 """Largest depth of nesting; no ROS message comes near it."""
 
 _MANY = 32
@@ -92,7 +92,7 @@ def decode_cbor(data: bytes) -> Any:
             data.removeprefix(_SELF_DESCRIBED),
             tag_hook=_typed_array,
             semantic_decoders=_REFUSED,
-            max_depth=MOST_DEPTH,
+            max_depth=MAX_DEPTH,
             strict_hashable_types=True,
         )
     except (cbor2.CBORError, ValueError, TypeError, RecursionError) as error:

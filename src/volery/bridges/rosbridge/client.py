@@ -27,7 +27,7 @@ from websockets.uri import parse_uri
 from volery.bridges.loop_waker import wake_of
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.message_encoder import Generation
-from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MOST_MESSAGE_BYTES, Frame
+from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, MAX_MESSAGE_BYTES, Frame
 from volery.core.errors import BridgeError, GraphError, UnreachableError, reason_of
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.service_reply import ServiceReply
@@ -73,7 +73,7 @@ class RosbridgeClient:
         name: str = "volery",
         token: str | None = None,
         connect_timeout_s: float = 5.0,
-        max_message_bytes: int = MOST_MESSAGE_BYTES,
+        max_message_bytes: int = MAX_MESSAGE_BYTES,
         generation: Generation = "ros2",
     ) -> None:
         self._socket = url.removeprefix(_UNIX) if url.startswith(_UNIX) else None
@@ -90,7 +90,7 @@ class RosbridgeClient:
         self._connected = threading.Event()
         self._connections = 0
         self._closed = False
-        self._most_bytes = max_message_bytes
+        self._max_bytes = max_message_bytes
         self._wanted = asyncio.Event()
         self._state = ClientState(token, wake_of(self._loop, self._wanted.set), generation)
         self._start(connect_timeout_s)
@@ -290,7 +290,7 @@ class RosbridgeClient:
             **at,
             subprotocols=[CBOR_PROTOCOL],  # type: ignore[list-item]
             compression=None,
-            max_size=self._most_bytes,
+            max_size=self._max_bytes,
             ping_interval=_KEEPALIVE_S,
             ping_timeout=_KEEPALIVE_S,
             close_timeout=1.0,

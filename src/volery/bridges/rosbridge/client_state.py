@@ -19,7 +19,7 @@ from volery.bridges.rosbridge.client_topics import RemoteTopics, Subscription
 from volery.bridges.rosbridge.fragments import Assembly
 from volery.bridges.rosbridge.message_encoder import Generation
 from volery.bridges.rosbridge.wire import (
-    MOST_MESSAGE_BYTES,
+    MAX_MESSAGE_BYTES,
     Frame,
     Operation,
     decode_frame,
@@ -36,10 +36,10 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
 from volery.graph.subscription_queue import Wake
 
-MOST_WAITING = 1000
+MAX_WAITING = 1000
 """Publications that may wait for the network."""
-MOST_WAITING_BYTES = 64 * 1024 * 1024
-MOST_PROBLEMS = 100
+MAX_WAITING_BYTES = 64 * 1024 * 1024
+MAX_PROBLEMS = 100
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class ClientState(RemoteTopics):
 
     def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
         super().__init__(threading.RLock(), known)
-        self.problems: deque[str] = deque(maxlen=MOST_PROBLEMS)
+        self.problems: deque[str] = deque(maxlen=MAX_PROBLEMS)
         self.dropped = 0
         self._token = token
         self._wake = wake
@@ -83,7 +83,7 @@ class ClientState(RemoteTopics):
         )
         self._offers: dict[str, _Offer] = {}
         self._calls: dict[str, _Call] = {}
-        self._orders: deque[Frame] = deque()
+        self._operations: deque[Frame] = deque()
         self._publications: deque[Frame] = deque()
         self._publication_bytes = 0
         self._numbers = itertools.count(1)
@@ -95,7 +95,7 @@ class ClientState(RemoteTopics):
         """Starts a connection: repeats all requests. cbor: whether the server accepts CBOR."""
         with self._lock:
             self._connected, self._cbor = True, cbor
-            self._orders.clear()
+            self._operations.clear()
             self._assembly = _new_assembly()
             if self._token is not None:
                 self._order({"op": "auth", "token": self._token})
@@ -110,7 +110,7 @@ class ClientState(RemoteTopics):
             self.dropped += len(self._publications)
             self._publications.clear()
             self._publication_bytes = 0
-            self._orders.clear()
+            self._operations.clear()
             calls, self._calls = list(self._calls.values()), {}
         for call in calls:
             call.reply.fail(GraphError(why))
@@ -119,8 +119,8 @@ class ClientState(RemoteTopics):
         """Yields the frames to send: requests and answers first, then publications."""
         while True:
             with self._lock:
-                if self._orders:
-                    frame = self._orders.popleft()
+                if self._operations:
+                    frame = self._operations.popleft()
                 elif self._publications:
                     frame = self._publications.popleft()
                     self._publication_bytes -= len(frame)
@@ -136,7 +136,7 @@ class ClientState(RemoteTopics):
     def _order(self, operation: Operation) -> None:
         """Queues an operation if there is a connection; `begin` repeats lasting ones."""
         if self._connected:
-            self._orders.append(encode_json(operation))
+            self._operations.append(encode_json(operation))
             self._wake()
 
     # ---------------------------------------------------------------------------------- services
@@ -240,8 +240,7 @@ class ClientState(RemoteTopics):
             self._publications.append(frame)
             self._publication_bytes += len(frame)
             while (
-                len(self._publications) > MOST_WAITING
-                or self._publication_bytes > MOST_WAITING_BYTES
+                len(self._publications) > MAX_WAITING or self._publication_bytes > MAX_WAITING_BYTES
             ):
                 self._publication_bytes -= len(self._publications.popleft())
                 self.dropped += 1
@@ -270,7 +269,7 @@ class ClientState(RemoteTopics):
             if whole is not None:
                 self._handle(decode_frame(whole), now_s)
         elif op == "png":
-            self._handle(decode_png(operation, MOST_MESSAGE_BYTES), now_s)
+            self._handle(decode_png(operation, MAX_MESSAGE_BYTES), now_s)
         elif op == "status":
             self.problems.append(str(operation.get("msg")))
 
@@ -338,4 +337,4 @@ def _service_type_of(values: Any) -> str:
 
 def _new_assembly() -> Assembly:
     """Returns an assembly with an account of its own: the server is trusted."""
-    return Assembly(MOST_MESSAGE_BYTES, account=UnfinishedMessages(5 * MOST_MESSAGE_BYTES))
+    return Assembly(MAX_MESSAGE_BYTES, account=UnfinishedMessages(5 * MAX_MESSAGE_BYTES))

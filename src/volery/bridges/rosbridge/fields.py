@@ -9,7 +9,7 @@ from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError
 from volery.graph.qos import (
     DEFAULT_DEPTH,
-    MOST_DEPTH,
+    MAX_DEPTH,
     DurabilityPolicy,
     QoSProfile,
     ReliabilityPolicy,
@@ -20,7 +20,7 @@ Id = str | int | float | None
 
 MAX_FRAGMENT = 1e9
 """Largest size of fragments, characters; no message is as long."""
-MOST_NAME = 1000
+MAX_NAME_LENGTH = 1000
 """Largest number of characters of a name or an id."""
 
 
@@ -29,8 +29,8 @@ def read_text(operation: Operation, key: str) -> str:
     value = operation.get(key)
     if not isinstance(value, str) or not value:
         raise BridgeError(f"{operation['op']}: '{key}' must be text and not empty")
-    if len(value) > MOST_NAME:
-        raise BridgeError(f"{operation['op']}: '{key}' has more than {MOST_NAME} characters")
+    if len(value) > MAX_NAME_LENGTH:
+        raise BridgeError(f"{operation['op']}: '{key}' has more than {MAX_NAME_LENGTH} characters")
     return value
 
 
@@ -44,7 +44,7 @@ def read_optional_text(operation: Operation, key: str) -> str | None:
 def read_id(operation: Operation) -> Id:
     """Returns the operation's id. Raises `BridgeError` if it is neither text nor number."""
     value = operation.get("id")
-    if value is None or (isinstance(value, str) and len(value) <= MOST_NAME):
+    if value is None or (isinstance(value, str) and len(value) <= MAX_NAME_LENGTH):
         return value
     if isinstance(value, (int, float)) and abs(value) < 2**63:
         return value
@@ -65,7 +65,7 @@ def read_limit(operation: Operation, key: str, greatest: float) -> float:
 
 
 def read_number(
-    operation: Operation, key: str, default: float, least: float, greatest: float
+    operation: Operation, key: str, default: float, minimum: float, maximum: float
 ) -> float:
     """Returns a number within bounds, or the default. Raises `BridgeError` otherwise."""
     value: Any = operation.get(key)
@@ -73,8 +73,8 @@ def read_number(
         return default
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise BridgeError(f"{operation['op']}: '{key}' must be a number")
-    if math.isnan(value) or not least <= value <= greatest:
-        raise BridgeError(f"{operation['op']}: '{key}' must be {least:g} to {greatest:g}")
+    if math.isnan(value) or not minimum <= value <= maximum:
+        raise BridgeError(f"{operation['op']}: '{key}' must be {minimum:g} to {maximum:g}")
     return float(value)
 
 
@@ -104,7 +104,7 @@ def read_qos(operation: Operation) -> QoSProfile | None:
     reliability = read_choice(fields, "reliability", tuple(ReliabilityPolicy))
     durability = read_choice(fields, "durability", tuple(DurabilityPolicy))
     return QoSProfile(
-        int(read_number(fields, "depth", DEFAULT_DEPTH, 1, MOST_DEPTH)),
+        int(read_number(fields, "depth", DEFAULT_DEPTH, 1, MAX_DEPTH)),
         ReliabilityPolicy(reliability),
         DurabilityPolicy(durability),
     )

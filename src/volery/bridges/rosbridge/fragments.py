@@ -10,9 +10,9 @@ from volery.bridges.rosbridge.wire import Operation, encode_json
 from volery.bridges.unfinished import MAX_UNFINISHED_S, NO_ROOM, SHARED, UnfinishedMessages
 from volery.core.errors import BridgeError
 
-MOST_OPEN = 32
+MAX_OPEN = 32
 """Messages of one client that may be incomplete at once."""
-MOST_FRAGMENTS = 100_000
+MAX_FRAGMENTS = 100_000
 """Fragments of one message."""
 _OVERHEAD_BYTES = 64
 """Cost of storing a fragment besides its text, so that empty ones count too."""
@@ -48,14 +48,14 @@ class Assembly:
 
     def __init__(
         self,
-        most_bytes: int,
+        max_bytes: int,
         on_dropped: Callable[[], None] = lambda: None,
         account: UnfinishedMessages = SHARED,
     ) -> None:
-        self._most_bytes = most_bytes
+        self._max_bytes = max_bytes
         self._open: dict[str, _Open] = {}
         self._size = 0
-        self._share = account.open(on_dropped)
+        self._budget = account.open(on_dropped)
 
     @property
     def waiting(self) -> int:
@@ -88,11 +88,11 @@ class Assembly:
         message = self._message(key, total, now_s)
         if number not in message.parts:
             cost = len(data) + _OVERHEAD_BYTES
-            if self._size + cost > self._most_bytes:
+            if self._size + cost > self._max_bytes:
                 self._forget(key)
-                raise BridgeError(f"fragment: more than {self._most_bytes} bytes are incomplete")
+                raise BridgeError(f"fragment: more than {self._max_bytes} bytes are incomplete")
             memory_bytes = sys.getsizeof(data) + _OVERHEAD_BYTES
-            if not self._share.hold(self._memory_bytes + memory_bytes):
+            if not self._budget.hold(self._memory_bytes + memory_bytes):
                 self._forget(key)
                 raise BridgeError(f"fragment: {NO_ROOM}")
             message.memory_bytes += memory_bytes
@@ -126,7 +126,7 @@ class Assembly:
         """Frees everything of a client that has left."""
         self._open.clear()
         self._size = 0
-        self._share.close()
+        self._budget.close()
 
     @property
     def _memory_bytes(self) -> int:
@@ -135,10 +135,10 @@ class Assembly:
     def _message(self, key: str, total: int, now_s: float) -> _Open:
         message = self._open.get(key)
         if message is None:
-            if total > MOST_FRAGMENTS:
-                raise BridgeError(f"fragment: more than {MOST_FRAGMENTS} of one message")
-            if len(self._open) >= MOST_OPEN:
-                raise BridgeError(f"fragment: more than {MOST_OPEN} messages are incomplete")
+            if total > MAX_FRAGMENTS:
+                raise BridgeError(f"fragment: more than {MAX_FRAGMENTS} of one message")
+            if len(self._open) >= MAX_OPEN:
+                raise BridgeError(f"fragment: more than {MAX_OPEN} messages are incomplete")
             message = self._open[key] = _Open(total, now_s)
         if message.total != total:
             self._forget(key)
@@ -149,4 +149,4 @@ class Assembly:
         message = self._open.pop(key, None)
         if message is not None:
             self._size -= message.size
-            self._share.hold(self._memory_bytes)
+            self._budget.hold(self._memory_bytes)

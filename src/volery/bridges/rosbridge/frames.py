@@ -16,7 +16,7 @@ from volery.graph.messages import (
 )
 
 _LONGEST_CHAIN = 100
-_MOST_FRAMES = 10_000
+_MAX_FRAMES = 10_000
 Numbers = tuple[float, ...]
 
 
@@ -62,7 +62,7 @@ class Frames:
         """Stores transforms; ignores those of frames beyond ten thousand."""
         for stamped in transforms:
             child = stamped.child_frame_id.lstrip("/")
-            if child not in self._parents and len(self._parents) >= _MOST_FRAMES:
+            if child not in self._parents and len(self._parents) >= _MAX_FRAMES:
                 continue
             move, turn = stamped.transform.translation, stamped.transform.rotation
             pose = KnownFrames(

@@ -25,7 +25,7 @@ MAX_MESSAGE_BYTES = 10_000_000
 WebSocket's message is copied several times: 25 MB would delay other clients by 50 to 100 ms."""
 MAX_TEXT_BYTES = 16 * 1024 * 1024
 """Largest message as JSON: 12 MB as base64 text."""
-MAX_PICTURE_BYTES = 4 * 1024 * 1024
+MAX_IMAGE_BYTES = 4 * 1024 * 1024
 """Largest message as JSON inside a PNG image."""
 MAX_VALUES = 200_000
 """Largest number of values of all kinds and names of members in one message."""
@@ -45,7 +45,7 @@ _COMMA, _COLON, _OBJECT, _LIST = b",:{["
 
 _BYTE_STRING, _TEXT, _ARRAY, _MAP, _TAG, _SIMPLE = 2, 3, 4, 5, 6, 7
 _INDEFINITE = 31
-_LEAST_RUN = 64
+_MIN_RUN = 64
 """Length below which runs of numbers are counted one by one."""
 
 
@@ -98,7 +98,7 @@ class _Walk:
                 self._containers += 1
                 if info != _INDEFINITE:
                     self._announced(number, major)
-                if major == _ARRAY and number >= _LEAST_RUN and info != _INDEFINITE:
+                if major == _ARRAY and number >= _MIN_RUN and info != _INDEFINITE:
                     position = self._pass_numbers(position, number)
             if not self._apart % 1000 or self._containers > MAX_CONTAINERS:
                 self._check()

@@ -27,10 +27,10 @@ from volery.bridges.rosbridge.fields import (
     read_id,
     with_id,
 )
-from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
+from volery.bridges.rosbridge.fragments import MAX_FRAGMENTS, Assembly, split
 from volery.bridges.rosbridge.message_budget import (
+    MAX_IMAGE_BYTES,
     MAX_MESSAGE_BYTES,
-    MAX_PICTURE_BYTES,
     MAX_TEXT_BYTES,
     MAX_UNAUTHORIZED_BYTES,
 )
@@ -55,9 +55,9 @@ LEVELS = ("error", "none", "warning", "info")
 """Words of `set_level`; the first is the default."""
 _LOUDNESS = {"none": 0, "error": 1, "warning": 2, "info": 3}
 
-MOST_WAITING_BYTES = 8 * 1024 * 1024
+MAX_WAITING_BYTES = 8 * 1024 * 1024
 """Bytes of answers that may wait for a client; beyond, reading from the client pauses."""
-MOST_WRAPS = 3
+MAX_WRAPS = 3
 """Depth of wrapping: an operation may be inside an image in fragments, not deeper."""
 
 
@@ -70,7 +70,7 @@ class ServerContext:
     """Simulated time."""
     token: str | None = None
     """Token that a client must send first; None: none."""
-    most_bytes: int = MAX_MESSAGE_BYTES
+    max_bytes: int = MAX_MESSAGE_BYTES
     """Largest message, also after assembly from fragments or an image."""
 
 
@@ -117,9 +117,9 @@ class RosbridgePeer:
         self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
         self._waiting_bytes = 0
         self._assembly = Assembly(
-            min(shared.most_bytes, MAX_TEXT_BYTES), lambda: post(self._drop_fragments)
+            min(shared.max_bytes, MAX_TEXT_BYTES), lambda: post(self._drop_fragments)
         )
-        self._max_image_bytes = min(shared.most_bytes, MAX_PICTURE_BYTES)
+        self._max_image_bytes = min(shared.max_bytes, MAX_IMAGE_BYTES)
         self._numbers = itertools.count()
         self._closed = False
         self._now_s = 0.0
@@ -169,8 +169,8 @@ class RosbridgePeer:
         if not self.authorized and len(frame) > MAX_UNAUTHORIZED_BYTES:
             self.refused = f"not authorized: more than {MAX_UNAUTHORIZED_BYTES} bytes"
             return
-        if len(frame) > self._shared.most_bytes:
-            self._status("error", f"a message of more than {self._shared.most_bytes} bytes", {})
+        if len(frame) > self._shared.max_bytes:
+            self._status("error", f"a message of more than {self._shared.max_bytes} bytes", {})
             return
         operation: Operation = {}
         try:
@@ -184,7 +184,7 @@ class RosbridgePeer:
 
     def _handle(self, operation: Operation, now_s: float, depth: int) -> None:
         op = operation["op"]
-        if depth > MOST_WRAPS:
+        if depth > MAX_WRAPS:
             raise BridgeError("an operation is wrapped too often")
         if not self.authorized and op != "auth":
             self.refused = "not authorized: send {'op': 'auth', 'token': ...} first"
@@ -194,8 +194,8 @@ class RosbridgePeer:
             if whole is not None:
                 self._handle_inner(decode_frame(whole, limited=True), now_s, depth)
         elif op == "png":
-            picture = decode_png(operation, self._max_image_bytes, limited=True)
-            self._handle_inner(picture, now_s, depth)
+            image_text = decode_png(operation, self._max_image_bytes, limited=True)
+            self._handle_inner(image_text, now_s, depth)
         else:
             handler = self._handlers.get(op)
             if handler is None:
@@ -244,7 +244,7 @@ class RosbridgePeer:
     @property
     def congested(self) -> bool:
         """Whether so many bytes wait for the client that reading from it should pause."""
-        return self._waiting_bytes > MOST_WAITING_BYTES
+        return self._waiting_bytes > MAX_WAITING_BYTES
 
     @property
     def has_answers(self) -> bool:
@@ -312,8 +312,8 @@ class RosbridgePeer:
     def _pieces(self, text: str, size: int | None) -> Iterator[Frame]:
         if size is None or len(text) <= size:
             return iter((text,))
-        least = -(-len(text) // MOST_FRAGMENTS)
-        return split(text, max(size, least), f"fragments:{next(self._numbers)}")
+        min_size = -(-len(text) // MAX_FRAGMENTS)
+        return split(text, max(size, min_size), f"fragments:{next(self._numbers)}")
 
     def _complain(self, text: str) -> None:
         self._status("error", text, {})

@@ -14,8 +14,8 @@ from volery.core.errors import GraphError
 from volery.graph.parameters import Parameter
 from volery.graph.parameters import Parameters as Declared
 
-MOST_PARAMETERS = 10_000
-MOST_VALUE = 1_000_000
+MAX_PARAMETERS = 10_000
+MAX_VALUE_LENGTH = 1_000_000
 """Largest number of characters of a parameter's JSON text."""
 
 
@@ -35,7 +35,7 @@ class Parameters:
 
     def set(self, name: str, value: str) -> None:
         """Sets a value. Raises `GraphError` if there would be too much."""
-        if len(value) > MOST_VALUE or len(self._values) >= MOST_PARAMETERS:
+        if len(value) > MAX_VALUE_LENGTH or len(self._values) >= MAX_PARAMETERS:
             raise GraphError(f"parameter '{name}': too large, or too many parameters")
         self._values[absolute(name)] = value
 

@@ -43,7 +43,7 @@ _handshakes.addFilter(RepeatFilter(bare=("opening handshake failed",)))
 """Logger of `websockets`, in which clients can cause any number of warnings."""
 
 DEFAULT_PORT = 9090
-MOST_CLIENTS = 1000
+MAX_CLIENTS = 1000
 HANDSHAKE_TIMEOUT_S = 10.0
 """Timeout of a WebSocket's request, including the wait for the check of its token."""
 _ONCE = ("Host", "Origin", "Authorization")
@@ -116,7 +116,7 @@ class RosbridgeServer:
         self._path = path
         self._token = token or None
         self._anywhere = anywhere
-        self._most_bytes = max_message_bytes
+        self._max_bytes = max_message_bytes
         self._generation: Generation = generation
         self._origins = Origins(origins, token_needed=bool(token))
         self._keepalive_s = keepalive_s
@@ -169,7 +169,7 @@ class RosbridgeServer:
         graph = gateway.graph
         self._gateway = gateway
         self._shared = ServerContext(
-            MessageEncoder(self._generation), graph.now_ns, self._token, self._most_bytes
+            MessageEncoder(self._generation), graph.now_ns, self._token, self._max_bytes
         )
         try:
             opening = Opening(look_at_http, HANDSHAKE_TIMEOUT_S)
@@ -182,9 +182,9 @@ class RosbridgeServer:
                 process_request=self._check_request,
                 select_subprotocol=_select_subprotocol,
                 compression=None,  # compression would cost more time than loopback and LANs do
-                max_size=self._most_bytes,
+                max_size=self._max_bytes,
                 max_queue=1,  # waiting messages may be as large
-                create_connection=guarded(self._token, self._most_bytes),
+                create_connection=guarded(self._token, self._max_bytes),
                 ping_interval=self._keepalive_s,
                 ping_timeout=self._keepalive_s,
                 close_timeout=1.0,
@@ -238,7 +238,7 @@ class RosbridgeServer:
             given = bearer.strip()
         if given is not None and not await self._is_token(given, connection):
             return connection.respond(HTTPStatus.UNAUTHORIZED, "wrong token\n")
-        if len(self._clients) >= MOST_CLIENTS:
+        if len(self._clients) >= MAX_CLIENTS:
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many clients\n")
         if given is not None:
             self._shown.add(connection)
@@ -246,7 +246,7 @@ class RosbridgeServer:
         return None
 
     def _foreign_protocol(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Returns the refusal of a client of Foxglove's own protocol, which would hear nothing."""
+        """Returns the refusal of a client of Foxglove's protocol, which would receive nothing."""
         offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
         if not any(name.strip().startswith(_FOXGLOVE) for name in offered):
             return None

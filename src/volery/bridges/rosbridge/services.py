@@ -26,7 +26,7 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 from volery.graph.typestore import typestore
 
-MOST_CALLS = 1000
+MAX_CALLS = 1000
 """Open calls of one client, and open requests to it."""
 
 Send = Callable[[Operation, int | None, str], None]
@@ -81,8 +81,8 @@ class RosbridgeServices:
         respond: Callable[[Any, bool], None],
         deadline_s: float | None,
     ) -> None:
-        if len(self._calls) >= MOST_CALLS:
-            respond(f"more than {MOST_CALLS} calls are open", False)
+        if len(self._calls) >= MAX_CALLS:
+            respond(f"more than {MAX_CALLS} calls are open", False)
             return
         number = next(self._call_numbers)
 
@@ -156,7 +156,7 @@ class RosbridgeServices:
 
     def _request(self, name: str, srvtype: str, request: Any, reply: ServiceReply) -> None:
         """Sends a request to the client."""
-        if len(self._requests) >= MOST_CALLS:
+        if len(self._requests) >= MAX_CALLS:
             reply.fail(GraphError(f"service '{name}': its server is busy"))
             return
         number = f"call_service:{name}:{next(self._request_numbers)}"

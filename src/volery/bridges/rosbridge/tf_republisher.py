@@ -25,9 +25,9 @@ SERVICE = "/republish_tfs"
 _SRVTYPE = "tf2_web_republisher/srv/RepublishTFs"
 _ARRAY = "tf2_web_republisher/msg/TFArray"
 _TF = "tf2_msgs/msg/TFMessage"
-_MOST_FRAMES = 500
+_MAX_FRAMES = 500
 """Frames that are followed for all clients together."""
-_MOST_HZ, _USUAL_HZ = 30.0, 10.0
+_MAX_HZ, _USUAL_HZ = 30.0, 10.0
 _USUAL_TIMEOUT_S = 10.0
 _LONGEST_TIMEOUT_S = 600.0
 _DEPTH = 1000
@@ -107,9 +107,9 @@ class TfRepublisher:
             now_s = time.monotonic()
             if topic is None:
                 followed = sum(len(known.sources) for known in self._topics)
-                if followed + len(wish.sources) > _MOST_FRAMES:
+                if followed + len(wish.sources) > _MAX_FRAMES:
                     raise GraphError(
-                        f"{SERVICE}: {followed} frames are followed already, {_MOST_FRAMES} at "
+                        f"{SERVICE}: {followed} frames are followed already, {_MAX_FRAMES} at "
                         "most; unsubscribe from topics that are not needed"
                     )
                 topic = _Topic(f"/tf_repub_{next(self._numbers)}", timeout_s, now_s)
@@ -127,7 +127,7 @@ class TfRepublisher:
         return topic.name
 
     def _work(self) -> None:
-        while not self._ended.wait(1.0 / _MOST_HZ):
+        while not self._ended.wait(1.0 / _MAX_HZ):
             for queue in self._queues:
                 for published in queue.take(_DEPTH):
                     message: TFMessage = published.message
@@ -183,7 +183,7 @@ def _wish_of(request: Any) -> _Wish:
         request.target_frame.lstrip("/"),
         max(float(request.angular_thres), 0.0),
         max(float(request.trans_thres), 0.0),
-        min(rate_hz, _MOST_HZ) if math.isfinite(rate_hz) and rate_hz > 0.1 else _USUAL_HZ,
+        min(rate_hz, _MAX_HZ) if math.isfinite(rate_hz) and rate_hz > 0.1 else _USUAL_HZ,
     )
 
 

@@ -25,13 +25,13 @@ from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.present_times import with_present_times
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import Published
-from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
+from volery.graph.qos import DEFAULT_DEPTH, MAX_DEPTH
 from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
 
-MOST_STREAMS = 10_000
+MAX_STREAMS = 10_000
 """Largest number of topics that a client may subscribe to, and publish."""
-MOST_REQUESTS = 1000
+MAX_REQUESTS = 1000
 """Largest number of subscriptions of one topic by one client."""
 
 
@@ -61,7 +61,7 @@ def read_wishes(operation: Operation) -> SubscriptionOptions:
     """Reads the options of a `subscribe` operation. Raises `BridgeError` for invalid values."""
     size = read_limit(operation, "fragment_size", MAX_FRAGMENT)
     qos = read_qos(operation)
-    length = int(read_limit(operation, "queue_length", MOST_DEPTH))
+    length = int(read_limit(operation, "queue_length", MAX_DEPTH))
     return SubscriptionOptions(
         read_limit(operation, "throttle_rate", 1e9) / 1000.0,
         length or (0 if qos is None else qos.depth),
@@ -199,12 +199,12 @@ class RosbridgeTopics:
 
     def _check_room(self, topic: str, key: Id) -> None:
         known = self._published.get(topic)
-        if known is not None and key not in known.ids and len(known.ids) >= MOST_REQUESTS:
-            raise BridgeError(f"advertise: more than {MOST_REQUESTS} advertisements of '{topic}'")
+        if known is not None and key not in known.ids and len(known.ids) >= MAX_REQUESTS:
+            raise BridgeError(f"advertise: more than {MAX_REQUESTS} advertisements of '{topic}'")
 
     def _advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> Advertisements:
-        if topic not in self._published and len(self._published) >= MOST_STREAMS:
-            raise BridgeError(f"advertise: more than {MOST_STREAMS} topics")
+        if topic not in self._published and len(self._published) >= MAX_STREAMS:
+            raise BridgeError(f"advertise: more than {MAX_STREAMS} topics")
         self._session.advertise(topic, msgtype, latched=latched)
         return self._published.setdefault(topic, Advertisements(msgtype))
 
@@ -246,13 +246,13 @@ class RosbridgeTopics:
         wishes = read_wishes(operation)
         stream = self._streams.get(name)
         if stream is None:
-            if len(self._streams) >= MOST_STREAMS:
-                raise BridgeError(f"subscribe: more than {MOST_STREAMS} topics")
+            if len(self._streams) >= MAX_STREAMS:
+                raise BridgeError(f"subscribe: more than {MAX_STREAMS} topics")
             stream = TopicStream(name, msgtype)
         elif msgtype and msgtype != self._session.graph.topic_type(absolute(name)):
             raise GraphError(f"topic '{name}' is subscribed to with another type than {msgtype}")
-        if key not in stream.requests and len(stream.requests) >= MOST_REQUESTS:
-            raise BridgeError(f"subscribe: more than {MOST_REQUESTS} subscriptions of '{name}'")
+        if key not in stream.requests and len(stream.requests) >= MAX_REQUESTS:
+            raise BridgeError(f"subscribe: more than {MAX_REQUESTS} subscriptions of '{name}'")
         before = stream.requests.get(key)
         stream.requests[key] = wishes
         try:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.bridges.rosbridge.cbor_codec import MOST_DEPTH, decode_cbor
+from volery.bridges.rosbridge.cbor_codec import MAX_DEPTH, decode_cbor
 from volery.bridges.rosbridge.message_budget import check_cbor, check_json
 from volery.core.errors import BridgeError
 
@@ -26,7 +26,7 @@ Operation = dict[str, Any]
 
 CBOR_PROTOCOL = "rosbridge-cbor"
 """WebSocket subprotocol of clients that may send CBOR."""
-MOST_MESSAGE_BYTES = 64 * 1024 * 1024
+MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 """Largest message that a client accepts from a server; `message_budget` has the limits of servers.
 """
 
@@ -96,8 +96,8 @@ def encode_png(text: str) -> str:
     return encode_json({"op": "png", "data": base64.b64encode(file.getvalue()).decode("ascii")})
 
 
-def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) -> Operation:
-    """Returns the operation in an image of at most `most_bytes` pixel bytes; `limited`: as above.
+def decode_png(operation: Operation, max_bytes: int, *, limited: bool = False) -> Operation:
+    """Returns the operation in an image of at most `max_bytes` pixel bytes; `limited`: as above.
 
     Raises
     ------
@@ -115,8 +115,8 @@ def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) 
         if not data.startswith(_PNG_MAGIC):
             raise BridgeError("png: 'data' is not a PNG image")
         with Image.open(BytesIO(data), formats=("PNG",)) as image:
-            if 3 * image.width * image.height > most_bytes:
-                raise BridgeError(f"png: more than {most_bytes} bytes of pixels")
+            if 3 * image.width * image.height > max_bytes:
+                raise BridgeError(f"png: more than {max_bytes} bytes of pixels")
             pixels = image.convert("RGB").tobytes()
         inside = pixels.decode().rstrip("\n")
     except (binascii.Error, UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
@@ -163,7 +163,7 @@ def _plain(value: Any) -> Any:
 
 
 def _with_nulls(value: Any, depth: int) -> Any:
-    if depth > 2 * MOST_DEPTH:
+    if depth > 2 * MAX_DEPTH:
         raise ValueError("nested too deeply")
     if isinstance(value, dict):
         return {key: _with_nulls(inner, depth + 1) for key, inner in value.items()}

@@ -39,7 +39,7 @@ from volery.graph.subscription_queue import SubscriptionQueue
 _READ_BYTES = 256 << 10
 _DEPTH = 20
 _AGAIN_S = (0.1, 0.2, 0.5, 1.0, 2.0)
-_MOST_UNSENT_BYTES = 64 << 10
+_MAX_UNSENT_BYTES = 64 << 10
 _NOTICES_KEPT = 100
 
 
@@ -191,7 +191,7 @@ class SensorLinkClient:
 
     def _send(self, frame: bytes) -> None:
         writer = self._writer
-        if writer is None or writer.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES:
+        if writer is None or writer.transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
             self.unsent += 1
             return
         self._sent += 1

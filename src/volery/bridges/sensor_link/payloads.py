@@ -179,10 +179,10 @@ def _decode_scan(reader: _Reader, stamp_ns: int) -> tuple[str, Any]:
 
 def _encode_pose(odometry: Any, name: str) -> bytes:
     pose, twist = odometry.pose, odometry.twist
-    place, turn = pose.pose.position, pose.pose.orientation
+    position, turn = pose.pose.position, pose.pose.orientation
     linear, angular = twist.twist.linear, twist.twist.angular
     fixed = _POSE.pack(
-        *(place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w),
+        *(position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w),
         *(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z),
         *pose.covariance[::7].tolist(),
         *twist.covariance[::7].tolist(),
@@ -269,8 +269,8 @@ def _decode_image(reader: _Reader, stamp_ns: int) -> tuple[str, Any]:
 
 
 def _encode_command(stamped: Any, _name: str) -> bytes:
-    place, turn = stamped.pose.position, stamped.pose.orientation
-    fixed = _COMMAND.pack(place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+    position, turn = stamped.pose.position, stamped.pose.orientation
+    fixed = _COMMAND.pack(position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)
     return fixed + _texts(stamped.header.frame_id)
 
 

@@ -41,7 +41,7 @@ IMAGE_PORT = 10101
 DEPTH = 20
 """Frames of one sensor that wait for a client: half a second of a scanner with 40 Hz."""
 IMAGE_DEPTH = 1
-MOST_CLIENTS = 64
+MAX_CLIENTS = 64
 """Largest number of clients on each port."""
 
 _COMMAND_LIMIT_BYTES = 4096
@@ -188,9 +188,7 @@ class _Port:
         """Adds a client if there is room; returns whether there is."""
         if self._listener is None or self._server is None:
             return False
-        if len(self._clients) >= MOST_CLIENTS and not self._listener.make_room_for(
-            client.transport
-        ):
+        if len(self._clients) >= MAX_CLIENTS and not self._listener.make_room_for(client.transport):
             return False
         self._clients.add(client)
         self._streams.open()
@@ -242,7 +240,7 @@ class _Client(asyncio.Protocol):
         tend(transport.get_extra_info("socket"))
         transport.set_write_buffer_limits(high=_WRITE_BUFFER_BYTES)
         if not self._port.admit(self):
-            self._notify(f"there are {MOST_CLIENTS} clients already")
+            self._notify(f"there are {MAX_CLIENTS} clients already")
             transport.close()
             return
         self._session = self._gateway.open(self._name)

@@ -27,7 +27,7 @@ SENSORS = (SensorLinkKind.LASER_SCAN, SensorLinkKind.POSE, SensorLinkKind.IMU, S
 IMAGES = (SensorLinkKind.IMAGE,)
 
 _UAV_TOPIC = re.compile(r"/uav([1-9]\d{0,4})/(.+)")
-_MOST_UAVS = 0xFFFF
+_MAX_UAVS = 0xFFFF
 _NEW_TOPICS_PERIOD_S = 0.5
 _CRC_STEP_BYTES = 64 << 10
 """Bytes of a fifth of a millisecond, for which others wait for an image's CRC."""
@@ -113,7 +113,7 @@ class SensorStreams:
         while True:
             for topic in self._gateway.graph.topics():
                 kind, found = self._kinds.get(topic.msgtype), _UAV_TOPIC.fullmatch(topic.name)
-                if kind is not None and found is not None and int(found[1]) <= _MOST_UAVS:
+                if kind is not None and found is not None and int(found[1]) <= _MAX_UAVS:
                     stream = self._streams.get(topic.name)
                     if stream is None:
                         stream = SensorStream(kind, int(found[1]), found[2])

@@ -48,7 +48,7 @@ class SensorLinkFrame:
 
 
 def limit_of(kind: int) -> int:
-    """Returns the most bytes that a payload of this type may have."""
+    """Returns the maximum size of a payload of this type, bytes."""
     return IMAGE_LIMIT_BYTES if kind == SensorLinkKind.IMAGE else OTHER_LIMIT_BYTES
 
 

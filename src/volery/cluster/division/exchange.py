@@ -73,12 +73,12 @@ class Outbox:
             srvtype = self._graph.service_type(service)
             self._items.append([CALL, service, srvtype, encode_cdr(request, f"{srvtype}_Request")])
 
-    def command(self, taken: ClientCommand) -> None:
+    def command(self, command: ClientCommand) -> None:
         """Adds a command of a client that is about to take effect."""
-        if taken.kind in ("refused", "end"):  # follow from the others
+        if command.kind in ("refused", "end"):  # follow from the others
             return
-        client, kind, name, msgtype, _, latched, request = taken
-        content = records.content_bytes(taken)
+        client, kind, name, msgtype, _, latched, request = command
+        content = records.content_bytes(command)
         self._items.append([COMMAND, client, kind, name, msgtype, content, latched, request])
 
     def answer(self, service: str, cdr: bytes, failure: str = "") -> None:
@@ -165,22 +165,22 @@ class Inbox:
             else:
                 self._publish(*rest, externally=kind == EXTERNAL)
 
-    def _command(self, taken: ClientCommand) -> None:
-        if taken.kind == "call" and taken.name in self.node_services:
-            self._serve(taken)
+    def _command(self, command: ClientCommand) -> None:
+        if command.kind == "call" and command.name in self.node_services:
+            self._serve(command)
         else:
-            self._repeater.repeat(taken)
+            self._repeater.repeat(command)
 
-    def _serve(self, taken: ClientCommand) -> None:
+    def _serve(self, command: ClientCommand) -> None:
         """Calls a service of a node for a client of the leader."""
-        name, outbox = taken.name, self._outbox
+        name, outbox = command.name, self._outbox
         reply = ServiceReply(
-            lambda answer: outbox.answer(name, encode_cdr(answer, f"{taken.type}_Response")),
+            lambda answer: outbox.answer(name, encode_cdr(answer, f"{command.type}_Response")),
             lambda error: outbox.answer(name, b"", str(error)),
         )
         try:
-            with self._graph.on_behalf_of(taken.client):
-                self._graph.call_async(name, taken.content, reply)
+            with self._graph.on_behalf_of(command.client):
+                self._graph.call_async(name, command.content, reply)
         except VoleryError as error:
             reply.fail(GraphError(str(error)))
 

@@ -19,7 +19,7 @@ from volery.scenario.file_names import texts_of
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 
-_MOST_BYTES = 500_000_000
+_MAX_BYTES = 500_000_000
 """Limit of the files that a scenario names."""
 
 
@@ -36,8 +36,8 @@ class DivisionJob:
     repeated: int = 0
     """Frames of the leader, but the early ones, that a lost worker was sent."""
 
-    def scenario(self, place: Path, *, trust: bool, folder: Path | None = None) -> Scenario:
-        """Returns the scenario; its files are written into the empty folder `place`.
+    def scenario(self, target: Path, *, trust: bool, folder: Path | None = None) -> Scenario:
+        """Returns the scenario; its files are written into the empty folder `target`.
 
         folder: that of the scenario, if this machine has it; then all files may be read. Raises
         `ScenarioError`, `DivisionError`.
@@ -45,11 +45,11 @@ class DivisionJob:
         for name, content in self.files.items():
             if not _is_inner(name):
                 raise DivisionError(f"the leader's file '{name[:80]}' lies outside of its folder")
-            path = place / name
+            path = target / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
         access = ScenarioAccess(
-            place if folder is None else folder,
+            target if folder is None else folder,
             is_confined=not trust and folder is None,
             is_trusted=trust,
             own_nodes=frozenset(_nodes(self.content)),
@@ -81,9 +81,9 @@ def files_of(scenario: Scenario) -> dict[str, bytes]:
                 "below it travel to other machines"
             )
         size += path.stat().st_size
-        if size > _MOST_BYTES:
+        if size > _MAX_BYTES:
             raise DivisionError(
-                f"{scenario.name}: its files have more than {_MOST_BYTES / 1e6:.0f} MB, too much "
+                f"{scenario.name}: its files have more than {_MAX_BYTES / 1e6:.0f} MB, too much "
                 "for other machines"
             )
         found[name] = path.read_bytes()

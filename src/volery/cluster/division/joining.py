@@ -52,8 +52,8 @@ def serve_leader(
             raise DivisionError("the leader sends no part of a run")
         job = DivisionJob(**rest[0])
         show(f"serves {counted(len(job.uavs), 'UAV')}")
-        with tempfile.TemporaryDirectory(prefix="volery_") as place:
-            scenario = partial(job.scenario, Path(place), trust=trust, folder=folder)
+        with tempfile.TemporaryDirectory(prefix="volery_") as target:
+            scenario = partial(job.scenario, Path(target), trust=trust, folder=folder)
             try:
                 return _flown(job, scenario, link, threads)
             except RunEndedError as error:
@@ -98,7 +98,7 @@ def _connected(
 
 
 def _report(link: Link, error: Exception) -> None:
-    """Tells the leader why this part of the run has failed."""
+    """Sends the leader the reason why this part of the run has failed."""
     text = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
     try:
         link.send("failed", text, list(getattr(error, "__notes__", ())))

@@ -141,7 +141,7 @@ class Leader:
             next_step = max(due, self._engine.fleet.step)
             for member, items in pending.items():
                 frame = [TICK, items, final, next_step, news[member]]
-                self._reach(member, partial(_send, frame))
+                self._call_member(member, partial(_send, frame))
             if final:
                 barriers.close(next_step)
             else:
@@ -163,7 +163,7 @@ class Leader:
             own = self._outbox.flush()
             for member in tuple(self._members):
                 frame = [RESPONSES, self._items_for(member, own)]
-                self._reach(member, partial(_send, frame))
+                self._call_member(member, partial(_send, frame))
 
     def end_tick(self) -> None:
         """At a barrier, receives what the workers' timers have caused."""
@@ -182,13 +182,13 @@ class Leader:
             if _may_respond(member, items):
                 member.relayed += items
             elif items:
-                self._reach(member, partial(_send, [EARLY, items]))
+                self._call_member(member, partial(_send, [EARLY, items]))
 
     def _receive(self) -> None:
         own_hash = state_hash(self._engine.fleet, self._exchanges)
         self._exchanges += 1
         for member in tuple(self._members):
-            frame = self._reach(member, self._batch_of)
+            frame = self._call_member(member, self._batch_of)
             if frame is None:
                 continue
             _, items, due, timers, their_hash, news = frame
@@ -218,7 +218,7 @@ class Leader:
             raise LinkError(f"{member.link.name} sends a broken frame")
         return frame
 
-    def _reach(self, member: Member, act: Callable[[Member], Any]) -> Any:
+    def _call_member(self, member: Member, act: Callable[[Member], Any]) -> Any:
         """Calls `act(member)`; on a loss, has its part taken over and tries again."""
         while member in self._members:
             try:

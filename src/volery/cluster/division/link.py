@@ -122,7 +122,8 @@ class Link:
 def admit(link: Link, token: str, versions: dict[str, str]) -> None:
     """Admits a worker that knows the token and has the leader's versions.
 
-    Raises `RefusedError` for another one, after it has been told why, `LinkError` for what is none.
+    Raises `RefusedError` for another one, after sending it the reason, and `LinkError` for what
+    is none.
     """
     nonce = secrets.token_bytes(32)
     link.send("leader", nonce)

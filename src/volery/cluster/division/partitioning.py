@@ -38,20 +38,20 @@ def divided(scenario: Scenario, machines: int) -> list[frozenset[str]]:
     with Simulation(scenario, threads=1) as simulation:
         uavs = list(simulation.uavs)
         groups, central = _groups(uavs, simulation.diagnostics.nodes)
-    shares = [set(central)] + [set() for _ in range(machines - 1)]
+    parts = [set(central)] + [set() for _ in range(machines - 1)]
     left, machine = len(uavs) - len(central), 0
     for group in groups:
-        fair = -(-(left + len(shares[machine])) // (machines - machine))
-        if shares[machine] and len(shares[machine]) + len(group) > fair and machine < machines - 1:
+        fair = -(-(left + len(parts[machine])) // (machines - machine))
+        if parts[machine] and len(parts[machine]) + len(group) > fair and machine < machines - 1:
             machine += 1
-        shares[machine].update(group)
+        parts[machine].update(group)
         left -= len(group)
-    if not all(shares[1:]):
+    if not all(parts[1:]):
         raise DivisionError(
             f"{scenario.name} has {_counted(len(groups), central)} to be divided, too few for "
             f"{counted(machines - 1, 'worker')} besides the leader"
         )
-    return [frozenset(share) for share in shares]
+    return [frozenset(part) for part in parts]
 
 
 def _counted(groups: int, central: Sequence[str]) -> str:

@@ -109,11 +109,11 @@ class Workers:
             self._start()
         else:
             self._await_others()
-        shares = divided(self._scenario, self._options.workers + 1)  # may build for minutes
-        self._members = [Member(*pair) for pair in zip(self._links, shares[1:], strict=True)]
+        parts = divided(self._scenario, self._options.workers + 1)  # may build for minutes
+        self._members = [Member(*pair) for pair in zip(self._links, parts[1:], strict=True)]
         for member in self._members:
             self._hand_out(member.link, member.uavs)
-        return Partition(named=frozenset().union(*shares[1:]))
+        return Partition(named=frozenset().union(*parts[1:]))
 
     def connect(self, parts: DivisionParts) -> Division:
         """Waits until all workers are ready; returns the connection of the leader to them."""
@@ -248,8 +248,8 @@ class Workers:
         start = time.monotonic()
         for _ in range(_MAX_TRIES):
             spare = self._next_link()
-            whose = "this machine" if spare is None else spare.name
-            self._show(f"{reason}; {whose} repeats its part so far and takes it over")
+            substitute = "this machine" if spare is None else spare.name
+            self._show(f"{reason}; {substitute} repeats its part so far and takes it over")
             try:
                 link = spare or self._start_here(threads=1)
                 self._hand_out(link, lost.uavs, lost.num_answered, is_here=spare is None)

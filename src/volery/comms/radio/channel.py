@@ -21,13 +21,13 @@ from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.scenario.radio import Radio
 
-Places = Callable[[], Mapping[int, Array]]
+Positions = Callable[[], Mapping[int, Array]]
 """Returns the stations' positions: address to (3,) m, map."""
 Looks = Callable[[Array, Array], Paths]
 """Returns the obstacles between positions (P, 3) and (P, 3), m, map."""
 
 _LOST = Delivery(lost=True)
-_MOST_TRIES = 8
+_MAX_TRIES = 8
 
 
 class _Sent(NamedTuple):
@@ -58,10 +58,10 @@ class RadioChannel(SavedAttributes):
         *("_jammers", "_noise_rises"),
     )
 
-    def __init__(self, radio: Radio, seed: int, places: Places, looks: Looks) -> None:
+    def __init__(self, radio: Radio, seed: int, positions: Positions, looks: Looks) -> None:
         self._radio = radio
         self._seed = seed
-        self._places = places
+        self._positions = positions
         self._looks = looks
         self._free_ns = 0
         """Time at which the channel is free again, ns."""
@@ -149,22 +149,22 @@ class RadioChannel(SavedAttributes):
         lost = packet_error_rate(self._radio, snr, len(frame.data))
         key = rng.stream_key(self._seed, f"radio/{source}-{destination}/frames")
         for k in range(tries):
-            if float(rng.uniform(key, _MOST_TRIES * frame.sequence + k)) >= lost:
+            if float(rng.uniform(key, _MAX_TRIES * frame.sequence + k)) >= lost:
                 return k + 1, True
         return tries, False
 
     def _look(self, time_ns: int) -> None:
         """Updates the path loss between all stations, and the noise of jammers at each."""
-        places = self._places()
-        pairs = list(combinations(sorted(places), 2))
+        positions = self._positions()
+        pairs = list(combinations(sorted(positions), 2))
         self._looked_ns, self._losses, self._noise_rises = time_ns, {}, {}
         if not pairs:
             return
         if self._jammers:
-            rises = self._rises(np.array(list(places.values())))
-            self._noise_rises = dict(zip(places, rises.tolist(), strict=True))
-        starts = np.array([places[one] for one, _ in pairs])
-        ends = np.array([places[other] for _, other in pairs])
+            rises = self._rises(np.array(list(positions.values())))
+            self._noise_rises = dict(zip(positions, rises.tolist(), strict=True))
+        starts = np.array([positions[one] for one, _ in pairs])
+        ends = np.array([positions[other] for _, other in pairs])
         distance = np.linalg.norm(ends - starts, axis=1)
         losses = loss_db(self._radio, distance, self._looks(starts, ends))
         self._losses = dict(zip(pairs, losses.tolist(), strict=True))

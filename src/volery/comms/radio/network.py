@@ -30,7 +30,7 @@ from volery.scenario.radio import RelayedTopic
 _TICK_S = 0.5
 """Less than the period at which stations must send, see `StationCore.tick`."""
 _LOST = Delivery(lost=True)
-_RULES = RouterSettings(grace_s=0.0, most_connections=FIRST_GROUND)
+_RULES = RouterSettings(grace_s=0.0, max_connections=FIRST_GROUND)
 """Without a grace time: a station that joins later receives no earlier messages."""
 
 

@@ -1,4 +1,4 @@
-"""Loss of a radio signal between two places, dB: distance, foliage, trunks, walls, ground.
+"""Loss of a radio signal between two positions, dB: distance, foliage, trunks, walls, ground.
 
 | part | formula | source |
 |---|---|---|
@@ -23,11 +23,11 @@ _LIGHT_M_S = 299_792_458.0
 _REFERENCE_M = 1.0
 _WEISSBERGER_KNEE_M, _WEISSBERGER_END_M = 14.0, 400.0
 
-# Recommendation ITU-R P.833-9, table of specific attenuation (dB/m) and of the most that woodland
-# takes (dB), by frequency in MHz: mixed forest near St. Petersburg.
+# Recommendation ITU-R P.833-9, table of specific attenuation (dB/m) and of the maximum that
+# woodland takes (dB), by frequency in MHz: mixed forest near St. Petersburg.
 _P833_MHZ = np.array([105.9, 466.475, 949.0, 1852.2, 2117.5])
 _P833_DB_M = np.array([0.04, 0.12, 0.17, 0.30, 0.34])
-_P833_MOST_DB = np.array([9.4, 18.0, 26.5, 29.0, 34.1])
+_P833_MAX_DB = np.array([9.4, 18.0, 26.5, 29.0, 34.1])
 
 
 class Paths(NamedTuple):
@@ -74,8 +74,8 @@ def foliage_loss_db(radio: Radio, depth_m: Array) -> Array:
         return np.zeros_like(depth_m)
     if radio.vegetation == "weissberger":
         return _weissberger_db(radio.frequency_mhz * 1e-3, depth_m)
-    per_m, most = woodland(radio.frequency_mhz)
-    loss: Array = most * -np.expm1(-depth_m * per_m / most)
+    per_m, max_db = woodland(radio.frequency_mhz)
+    loss: Array = max_db * -np.expm1(-depth_m * per_m / max_db)
     return loss
 
 
@@ -85,7 +85,7 @@ def woodland(frequency_mhz: float) -> tuple[float, float]:
     It interpolates its table linearly in the logarithms, and extrapolates by the power law through
     both ends.
     """
-    return _in_table(frequency_mhz, _P833_DB_M), _in_table(frequency_mhz, _P833_MOST_DB)
+    return _in_table(frequency_mhz, _P833_DB_M), _in_table(frequency_mhz, _P833_MAX_DB)
 
 
 def _in_table(frequency_mhz: float, values: Array) -> float:

@@ -14,8 +14,8 @@ class RateLimit:
 
     def __init__(self, messages_s: float, bytes_s: float, burst: int, now_ns: int) -> None:
         self._rates = (messages_s, bytes_s)
-        self._most = (float(burst), max(bytes_s, float(burst * LONGEST_BYTES)))
-        self._left = self._most
+        self._capacity = (float(burst), max(bytes_s, float(burst * LONGEST_BYTES)))
+        self._left = self._capacity
         self._at_ns = now_ns
 
     def allows(self, size: int, now_ns: int) -> bool:
@@ -23,8 +23,8 @@ class RateLimit:
         passed_s = max(now_ns - self._at_ns, 0) / NS_PER_S
         self._at_ns = now_ns
         messages, in_bytes = (
-            min(most, left + rate * passed_s)
-            for most, left, rate in zip(self._most, self._left, self._rates, strict=True)
+            min(capacity, left + rate * passed_s)
+            for capacity, left, rate in zip(self._capacity, self._left, self._rates, strict=True)
         )
         allowed = messages >= 1.0 and in_bytes >= size
         self._left = (messages - 1.0, in_bytes - size) if allowed else (messages, in_bytes)

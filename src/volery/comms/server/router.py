@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from volery.comms.addresses import SERVER, Identity
 from volery.comms.control_payloads import (
-    MOST_SEQUENCES,
+    MAX_SEQUENCES,
     Hello,
     Reason,
     Refusal,
@@ -70,7 +70,7 @@ class Router:
 
     def connect(self, now_ns: int) -> int | None:
         """Returns the number of a new connection; None: there are too many."""
-        if len(self._connections) >= self._settings.most_connections:
+        if len(self._connections) >= self._settings.max_connections:
             self._tally.refused[Reason.FULL] += 1
             return None
         self._opened += 1
@@ -86,7 +86,7 @@ class Router:
             self._take_frame(connection, known, frame, now_ns)
             if self.closing(connection):
                 return
-        if known.parser.corrupt > self._settings.most_corrupt:
+        if known.parser.corrupt > self._settings.max_corrupt:
             self._refuse_connection(connection, Reason.PROTOCOL, "too many damaged frames")
 
     def disconnect(self, connection: int, now_ns: int) -> None:
@@ -127,7 +127,7 @@ class Router:
         self._woken.clear()
         return woken
 
-    def take(self, connection: int, now_ns: int, most_bytes: int = 64 << 10) -> bytes:
+    def take(self, connection: int, now_ns: int, max_bytes: int = 64 << 10) -> bytes:
         """Returns the bytes to send now, some frames; empty: wait for `take_woken`."""
         known = self._connections.get(connection)
         if known is None:
@@ -141,7 +141,7 @@ class Router:
         if station.settled:
             frames.append(self._settled_frame(station))
         size = 0
-        while size < most_bytes:
+        while size < max_bytes:
             frame = station.queue.take(now_ns)
             if frame is None:
                 break
@@ -226,7 +226,7 @@ class Router:
             station.unsettled.clear()
             station.control.clear()
         station.settled.clear()  # WELCOME implies them
-        welcome = Welcome(self._boot, station.last, tuple(station.unsettled)[:MOST_SEQUENCES])
+        welcome = Welcome(self._boot, station.last, tuple(station.unsettled)[:MAX_SEQUENCES])
         connection.control.append(
             encode_frame(
                 StationFrameKind.WELCOME, SERVER, station.address, payload=encode_welcome(welcome)
@@ -248,10 +248,10 @@ class Router:
     # ---------------------------------------------------------------------------------- internals
 
     def _settled_frame(self, station: StationRecord) -> bytes:
-        told = station.settled[:MOST_SEQUENCES]
-        del station.settled[:MOST_SEQUENCES]
+        settled = station.settled[:MAX_SEQUENCES]
+        del station.settled[:MAX_SEQUENCES]
         return encode_frame(
-            StationFrameKind.SETTLED, SERVER, station.address, payload=encode_settled(told)
+            StationFrameKind.SETTLED, SERVER, station.address, payload=encode_settled(settled)
         )
 
     def _end_silent(self, number: int, connection: StationConnection, now_ns: int) -> None:

@@ -48,9 +48,9 @@ class RouterSettings:
     server.
     """
     rate_bytes_s: float = 16e6
-    most_corrupt: int = 100
+    max_corrupt: int = 100
     """Damaged frames after which a connection is closed."""
-    most_connections: int = 256
+    max_connections: int = 256
 
     def __post_init__(self) -> None:
         """Raises CommsError for invalid values."""

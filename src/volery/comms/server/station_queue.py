@@ -85,12 +85,12 @@ class StationQueue:
         self._settings = settings
         self._lanes: dict[int, _Lane] = {}
         self._turns: deque[int] = deque()
-        self._on_the_way = 0
+        self._num_in_flight = 0
         self._bytes = 0
 
     def __len__(self) -> int:
         """Returns the number of messages that wait or are in transit."""
-        return sum(len(lane) for lane in self._lanes.values()) + self._on_the_way
+        return sum(len(lane) for lane in self._lanes.values()) + self._num_in_flight
 
     def put(self, frame: StationFrame, now_ns: int, delay_ns: int = 0) -> tuple[SentMessage, int]:
         """Adds a message; returns the result and its due time.
@@ -118,7 +118,7 @@ class StationQueue:
 
         Sources take turns. At most `window` messages are in transit until `received`.
         """
-        if self._on_the_way >= self._settings.window:
+        if self._num_in_flight >= self._settings.window:
             return None
         for _ in range(len(self._turns)):
             source = self._turns.popleft()
@@ -131,7 +131,7 @@ class StationQueue:
                 continue
             waiting = queue.popleft()
             lane.sent.append(waiting)
-            self._on_the_way += 1
+            self._num_in_flight += 1
             self._bytes -= len(waiting.frame.data)
             if not lane:
                 self._turns.pop()
@@ -144,7 +144,7 @@ class StationQueue:
         if lane is None:
             return []
         came = [waiting.frame for waiting in lane.acknowledged(upto)]
-        self._on_the_way -= len(came)
+        self._num_in_flight -= len(came)
         self._forget_empty(upto.source, lane)
         return came
 
@@ -155,7 +155,7 @@ class StationQueue:
             lane.rewind()
             if lane and source not in self._turns:
                 self._turns.append(source)
-        self._on_the_way = 0
+        self._num_in_flight = 0
 
     def expire(self, before_ns: int) -> list[StationFrame]:
         """Removes and returns messages that arrived before a time."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from volery.core.clock import NS_PER_S
 
-_PACE = 0.5
+_MIN_GAP_RATIO = 0.5
 """Min ratio of the gaps at both ends; a smaller one is a backlog that arrives at once, or its
 beginning.
 """
@@ -33,7 +33,7 @@ class ClockOffset:
         """Returns the send time of a message that arrives now, by the own clock, at most now."""
         if self._before is not None:
             sent_gap_ns, gap_ns = sent_ns - self._before[0], now_ns - self._before[1]
-            if 0 < _PACE * sent_gap_ns <= gap_ns <= sent_gap_ns / _PACE:
+            if 0 < _MIN_GAP_RATIO * sent_gap_ns <= gap_ns <= sent_gap_ns / _MIN_GAP_RATIO:
                 self._offset_ns = now_ns - sent_ns
         self._before = sent_ns, now_ns
         if self._offset_ns is not None:

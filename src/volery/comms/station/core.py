@@ -46,7 +46,7 @@ _PING_NS = NS_PER_S
 _SILENCE_NS = 3 * NS_PER_S
 _ACKNOWLEDGE_AT_ONCE = 64
 _REFUSALS_KEPT = 256
-_MOST_RECEIVED = 1000
+_MAX_RECEIVED = 1000
 """Max entries of one RECEIVED, below the limit of payloads."""
 
 
@@ -177,9 +177,9 @@ class StationCore:
         """Acknowledges received messages; call it within some 50 ms after `feed`."""
         if not self.joined:
             return
-        told = self._inbox.take()
-        for start in range(0, len(told), _MOST_RECEIVED):
-            part = told[start : start + _MOST_RECEIVED]
+        received = self._inbox.take()
+        for start in range(0, len(received), _MAX_RECEIVED):
+            part = received[start : start + _MAX_RECEIVED]
             self._send_control(StationFrameKind.RECEIVED, encode_received(part), now_ns)
 
     @property

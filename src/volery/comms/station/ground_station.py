@@ -75,7 +75,7 @@ HEAD = (
     "position (m)",
     "speed (m/s)",
     "battery",
-    "heard (s ago)",
+    "received (s ago)",
     "mission",
     "SLAM",
     "problem",
@@ -165,7 +165,7 @@ class GroundStation:
         elif word == "take_off" and len(rest) == 2:
             name, fields = "take_off_to", {"altitude": _number(rest[1])}
         elif word == "go_to" and len(rest) in (4, 5):
-            name, fields = "go_to", _place(rest[1:])
+            name, fields = "go_to", _position_of(rest[1:])
         elif usage := _USAGE.get(_TYPED.get(word, word)):
             raise CommsError(f"'{line.strip()}': usage: {usage}")
         else:
@@ -211,14 +211,14 @@ class GroundStation:
         return f"{identity.batch}.{identity.plane}"
 
     def _row(self, address: int, state: Any, age_ns: int) -> StationRow:
-        place, velocity = state.position, state.velocity
+        position, velocity = state.position, state.velocity
         mission = self._missions.get(address)
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
         return StationRow(
             state.name,
             self._label(address),
             state.mode,
-            f"{place.x:.1f} {place.y:.1f} {place.z:.1f}",
+            f"{position.x:.1f} {position.y:.1f} {position.z:.1f}",
             f"{speed:.1f}",
             "-" if math.isnan(state.battery) else f"{100.0 * state.battery:.0f} %",
             f"{age_ns / NS_PER_S:.1f}",
@@ -228,7 +228,7 @@ class GroundStation:
         )
 
 
-def _place(words: list[str]) -> dict[str, Any]:
+def _position_of(words: list[str]) -> dict[str, Any]:
     heading = math.radians(_number(words[3])) if len(words) == 4 else 0.0
     x, y, z = map(_number, words[:3])
     return {"position": Point(x, y, z), "yaw": heading, "keep_heading": len(words) < 4}

@@ -39,7 +39,9 @@ class ReceiveLog:
 
     def take(self) -> list[Received]:
         """Returns the pending acknowledgements and clears them."""
-        told = [Received(source, session, last) for (source, session), last in self._logged.items()]
+        received = [
+            Received(source, session, last) for (source, session), last in self._logged.items()
+        ]
         self._logged.clear()
         self._unacknowledged = 0
-        return told
+        return received

@@ -10,9 +10,9 @@ from volery.comms.protocol import StationFrameKind
 from volery.core.errors import CommsError
 from volery.core.plurals import counted
 
-MOST_A_DESTINATION = 1024
+MAX_PER_DESTINATION = 1024
 """As deep as a lane of the server, so that the server accepts all of them after a restart."""
-MOST = 4000
+MAX_MESSAGES = 4000
 """Max number that one WELCOME can list, and one burst may hold."""
 
 
@@ -42,7 +42,7 @@ class SendBuffer:
     def put(self, sequence: int, kind: StationFrameKind, destination: int, data: bytes) -> None:
         """Stores a message. Raises CommsError if there is no room and no measurement to drop."""
         there = self._of.setdefault(destination, {})
-        if len(there) >= MOST_A_DESTINATION or len(self._messages) >= MOST:
+        if len(there) >= MAX_PER_DESTINATION or len(self._messages) >= MAX_MESSAGES:
             oldest = next(
                 (s for s, held in there.items() if held is StationFrameKind.SENSING), None
             )

@@ -8,8 +8,8 @@ import json
 def slam_gist(text: str) -> str:
     """Returns state and problems of a SLAM status (JSON); `?` if it is invalid."""
     try:
-        told = json.loads(text)
-        state, problems = str(told["state"]), [str(each) for each in told.get("problems", ())]
+        status = json.loads(text)
+        state, problems = str(status["state"]), [str(each) for each in status.get("problems", ())]
     except (ValueError, TypeError, KeyError, AttributeError):
         return "?"
     return ": ".join([state, ", ".join(problems)]) if problems else state

@@ -82,12 +82,20 @@ def _spread(P: Array, i: int, variance: float, keep: Array) -> None:
 def transform(P: Array, flow: Any) -> None:
     """Computes Phi P of the motion in place; a second call on the transpose gives Phi P Phi'."""
     t = flow.duration
-    b0, b1, b2 = three(flow.way)
+    b0, b1, b2 = three(flow.displacement)
     s0, s1, s2 = three(flow.speed)
     d0, d1, d2 = three(flow.turn[0]), three(flow.turn[1]), three(flow.turn[2])
-    e0, e1, e2 = three(flow.turn_way[0]), three(flow.turn_way[1]), three(flow.turn_way[2])
+    e0, e1, e2 = (
+        three(flow.turn_integral[0]),
+        three(flow.turn_integral[1]),
+        three(flow.turn_integral[2]),
+    )
     g0, g1, g2 = three(flow.gyro_speed[0]), three(flow.gyro_speed[1]), three(flow.gyro_speed[2])
-    h0, h1, h2 = three(flow.gyro_way[0]), three(flow.gyro_way[1]), three(flow.gyro_way[2])
+    h0, h1, h2 = (
+        three(flow.gyro_displacement[0]),
+        three(flow.gyro_displacement[1]),
+        three(flow.gyro_displacement[2]),
+    )
     for j in range(STATES):
         v0, v1, v2 = P[_V + j], P[_V + STATES + j], P[_V + 2 * STATES + j]
         r0, r1, r2 = P[_R + j], P[_R + STATES + j], P[_R + 2 * STATES + j]
@@ -227,7 +235,7 @@ def forget(P: Array, first: int, variance: Array) -> None:
 
 
 @part_kernel
-def forget_place(P: Array, variance: Array) -> None:
+def forget_position(P: Array, variance: Array) -> None:
     """Resets position and velocity to a GNSS fix with variance (6,).
 
     The new position has the receiver's error: minus its offset, plus noise.

@@ -78,8 +78,8 @@ class Estimator:
         self._queues = np.zeros((count, QUEUE), MEASUREMENT)
         self._work = np.zeros(1, WORK)
         self._tunings = np.zeros(count, TUNING)
-        for i, (own, place) in enumerate(zip(self._settings, mountings, strict=True)):
-            self._tunings[i] = tuning_of(own, place)[0]
+        for i, (own, own_mounting) in enumerate(zip(self._settings, mountings, strict=True)):
+            self._tunings[i] = tuning_of(own, own_mounting)[0]
         self.state: Estimate = Estimate(*(self._filters[name] for name in Estimate._fields))
         self.reset(
             np.arange(count),
@@ -348,9 +348,9 @@ class Estimator:
     ) -> None:
         variances = np.array(np.broadcast_to(variances, (len(rows), 6)), np.float64, order="C")
         finite = np.isfinite(values).all(axis=1)
-        told = np.atleast_1d(finite & (variances >= 0.0).all(axis=1))
+        usable = np.atleast_1d(finite & (variances >= 0.0).all(axis=1))
         if valid is not None:
-            told = np.atleast_1d(told & np.asarray(valid, dtype=np.bool_))
+            usable = np.atleast_1d(usable & np.asarray(valid, dtype=np.bool_))
         enqueue_rows(
             self._filters,
             self._tunings,
@@ -360,5 +360,5 @@ class Estimator:
             kind,
             values,
             variances,
-            told,
+            usable,
         )

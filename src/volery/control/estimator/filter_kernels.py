@@ -21,7 +21,7 @@ from volery.control.estimator.covariance_kernels import (
     correct,
     decay,
     forget,
-    forget_place,
+    forget_position,
     normalised_innovation,
     turn_errors,
 )
@@ -223,7 +223,7 @@ def _restart(state: Any, measured: Any, residual: Array) -> None:
     for k in range(3):
         state.position[k] += residual[k]
         state.velocity[k] = measured.value[3 + k]
-    forget_place(state.covariance, measured.variance)
+    forget_position(state.covariance, measured.variance)
     state.rejected_since_ns = -1
     state.restarts += 1
 

@@ -105,18 +105,18 @@ def flow_on(flow: Any, dt: float, before: Motion, after: Motion) -> None:
         my = flow.turn[1, j] + half * first[3 + j]
         mz = flow.turn[2, j] + half * first[6 + j]
         cx, cy, cz = cross(ax, ay, az, mx, my, mz)
-        flow.gyro_way[0, j] += dt * (flow.gyro_speed[0, j] + 0.5 * cx)
-        flow.gyro_way[1, j] += dt * (flow.gyro_speed[1, j] + 0.5 * cy)
-        flow.gyro_way[2, j] += dt * (flow.gyro_speed[2, j] + 0.5 * cz)
+        flow.gyro_displacement[0, j] += dt * (flow.gyro_speed[0, j] + 0.5 * cx)
+        flow.gyro_displacement[1, j] += dt * (flow.gyro_speed[1, j] + 0.5 * cy)
+        flow.gyro_displacement[2, j] += dt * (flow.gyro_speed[2, j] + 0.5 * cz)
         flow.gyro_speed[0, j] += cx
         flow.gyro_speed[1, j] += cy
         flow.gyro_speed[2, j] += cz
         for i in range(3):
             turn = half * (first[3 * i + j] + second[3 * i + j])
-            flow.turn_way[i, j] += dt * (flow.turn[i, j] + 0.5 * turn)
+            flow.turn_integral[i, j] += dt * (flow.turn[i, j] + 0.5 * turn)
             flow.turn[i, j] += turn
     for axis, speed in ((0, ax), (1, ay), (2, az)):
-        flow.way[axis] += dt * (flow.speed[axis] + 0.5 * speed)
+        flow.displacement[axis] += dt * (flow.speed[axis] + 0.5 * speed)
         flow.speed[axis] += speed
     flow.duration += dt
 
@@ -142,7 +142,7 @@ def still(flow: Any) -> None:
     flow.duration = 0.0
     flow.lost_turn = flow.lost_speed = 0.0
     for i in range(3):
-        flow.speed[i] = flow.way[i] = 0.0
+        flow.speed[i] = flow.displacement[i] = 0.0
         for j in range(3):
-            flow.turn[i, j] = flow.turn_way[i, j] = 0.0
-            flow.gyro_speed[i, j] = flow.gyro_way[i, j] = 0.0
+            flow.turn[i, j] = flow.turn_integral[i, j] = 0.0
+            flow.gyro_speed[i, j] = flow.gyro_displacement[i, j] = 0.0

@@ -99,11 +99,14 @@ def _copy_flow(target: Any, source: Any) -> None:
     target.duration = source.duration
     target.lost_turn, target.lost_speed = source.lost_turn, source.lost_speed
     for i in range(3):
-        target.speed[i], target.way[i] = source.speed[i], source.way[i]
+        target.speed[i], target.displacement[i] = source.speed[i], source.displacement[i]
         for j in range(3):
-            target.turn[i, j], target.turn_way[i, j] = source.turn[i, j], source.turn_way[i, j]
+            target.turn[i, j], target.turn_integral[i, j] = (
+                source.turn[i, j],
+                source.turn_integral[i, j],
+            )
             target.gyro_speed[i, j] = source.gyro_speed[i, j]
-            target.gyro_way[i, j] = source.gyro_way[i, j]
+            target.gyro_displacement[i, j] = source.gyro_displacement[i, j]
 
 
 @part_kernel
@@ -114,7 +117,7 @@ def _lever(state: Any, tuning: Any, flow: Any) -> None:
     x, y, z, w = four(state.attitude)
     ax, ay, az = three(tuning.imu_arm)
     for k in range(3):
-        flow.way[k] = -arm[k]
+        flow.displacement[k] = -arm[k]
         flow.speed[k] = -swing[k]
         # -R [arm]x: effect of a gyroscope bias on the arm
         sx, sy, sz = cross(ax, ay, az, 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))

@@ -39,12 +39,12 @@ def enqueue_rows(
         if late or state.waiting_measurements == len(queue):
             state.dropped += 1
             continue
-        place = state.waiting_measurements
+        index = state.waiting_measurements
         first = state.first_measurement
-        while place > 0 and _is_later(queue[(first + place - 1) % len(queue)], stamp_ns, kind):
-            queue[(first + place) % len(queue)] = queue[(first + place - 1) % len(queue)]
-            place -= 1
-        entry = queue[(first + place) % len(queue)]
+        while index > 0 and _is_later(queue[(first + index - 1) % len(queue)], stamp_ns, kind):
+            queue[(first + index) % len(queue)] = queue[(first + index - 1) % len(queue)]
+            index -= 1
+        entry = queue[(first + index) % len(queue)]
         entry.stamp_ns = stamp_ns
         entry.kind = kind
         for k in range(7):

@@ -61,11 +61,11 @@ FLOW = np.dtype(
     [
         ("duration", "f8"),  # s
         ("speed", "f8", 3),  # integral of the specific force, map, m/s
-        ("way", "f8", 3),  # and of that, m
+        ("displacement", "f8", 3),  # and of that, m
         ("turn", "f8", (3, 3)),  # integral of the rotation matrix, s
-        ("turn_way", "f8", (3, 3)),  # and of that, s^2
+        ("turn_integral", "f8", (3, 3)),  # and of that, s^2
         ("gyro_speed", "f8", (3, 3)),  # velocity by gyro bias, m
-        ("gyro_way", "f8", (3, 3)),  # position by gyro bias, m s
+        ("gyro_displacement", "f8", (3, 3)),  # position by gyro bias, m s
         ("lost_turn", "f8"),  # variances of what saturated readings left out, rad^2
         ("lost_speed", "f8"),  # m^2/s^2
     ],
@@ -73,7 +73,7 @@ FLOW = np.dtype(
 )
 """The error transition over an interval of motion, as the integrals of its blocks:
 
-p' = p + T v - way x r + gyro_way g - turn_way a
+p' = p + T v - displacement x r + gyro_displacement g - turn_integral a
 v' = v - speed x r + gyro_speed g - turn a
 r' = r - turn g
 """

@@ -13,8 +13,8 @@ from volery.scenario.base import Bounded
 Vector = tuple[float, float, float]
 NonNegativeVector = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 Quaternion = tuple[float, float, float, float]
-_LEAST_DENSITY = 1e-9
-Density = Annotated[NonNegativeFloat, AfterValidator(lambda value: max(value, _LEAST_DENSITY))]
+_MIN_DENSITY = 1e-9
+Density = Annotated[NonNegativeFloat, AfterValidator(lambda value: max(value, _MIN_DENSITY))]
 """Density of white noise; zero becomes a small value, so that the filter is regular."""
 
 

@@ -50,8 +50,8 @@ _LINE = re.compile(
     re.ASCII,
 )
 # Fixed arrays are allocated for every message, so a typing error must not cost gigabytes.
-_MOST_NUMBERS = 1 << 24
-_MOST_PARTS = 4096
+_MAX_NUMBERS = 1 << 24
+_MAX_PARTS = 4096
 MAX_FIELDS = 4096
 """Limit of the fields and constants of one type."""
 
@@ -282,9 +282,9 @@ def _describe(match: re.Match[str], package: str) -> Any:
         return element
     size = int(match["size"] or match["bound"] or 0)
     if match["size"] is not None:
-        most = _MOST_NUMBERS if base in NUMBERS else _MOST_PARTS
-        if not 1 <= size <= most:
-            raise ValueError(f"a fixed array of {base} must have 1 to {most} elements, not {size}")
+        limit = _MAX_NUMBERS if base in NUMBERS else _MAX_PARTS
+        if not 1 <= size <= limit:
+            raise ValueError(f"a fixed array of {base} must have 1 to {limit} elements, not {size}")
         return (Nodetype.ARRAY, (element, size))
     if match["bound"] is not None and size < 1:
         raise ValueError("a bounded array must allow at least 1 element")
@@ -321,9 +321,9 @@ def _number_value(text: str, base: str) -> bool | int | float:
     except ValueError:
         raise ValueError(f"'{text}' is not a {base}") from None
     if base in INTEGER_RANGES:
-        least, greatest = INTEGER_RANGES[base]
-        if not least <= value <= greatest:
-            raise ValueError(f"{text} does not fit {base} ({least} to {greatest})")
+        minimum, maximum = INTEGER_RANGES[base]
+        if not minimum <= value <= maximum:
+            raise ValueError(f"{text} does not fit {base} ({minimum} to {maximum})")
     return value
 
 

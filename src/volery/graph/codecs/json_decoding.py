@@ -176,13 +176,13 @@ def _value_decoder(described: Any) -> Convert:
         return _scalar_decoder(*detail)
     (inner, inner_detail), size = detail
     exact = size if kind == Nodetype.ARRAY else None
-    most = size if kind == Nodetype.SEQUENCE and size else None
+    limit = size if kind == Nodetype.SEQUENCE and size else None
 
     def check(length: int) -> None:
         if exact is not None and length != exact:
             raise _Mismatch(f"must have {counted(exact, 'element')}, not {length}")
-        if most is not None and length > most:
-            raise _Mismatch(f"must have at most {counted(most, 'element')}, not {length}")
+        if limit is not None and length > limit:
+            raise _Mismatch(f"must have at most {counted(limit, 'element')}, not {length}")
 
     if inner == Nodetype.BASE and inner_detail[0] in NUMBERS:
         return _array_decoder(inner_detail[0], check)
@@ -257,7 +257,7 @@ def _decode_float32(value: Any) -> float:
 
 
 def _integer_decoder(base: str) -> Convert:
-    least, greatest = INTEGER_RANGES[base]
+    minimum, maximum = INTEGER_RANGES[base]
     wraps = base == "byte"
 
     def decode(value: Any) -> int:
@@ -267,8 +267,8 @@ def _integer_decoder(base: str) -> Convert:
             if not whole and not isinstance(value, np.integer):
                 raise _Mismatch(f"must be an integer, not {_shown(value)}")
         number = int(value)
-        if not least <= number <= greatest:
-            raise _Mismatch(f"must be {least} to {greatest}, not {_shown(number)}")
+        if not minimum <= number <= maximum:
+            raise _Mismatch(f"must be {minimum} to {maximum}, not {_shown(number)}")
         return number - 256 if wraps and number > 127 else number
 
     return decode
@@ -304,8 +304,8 @@ def _array_decoder(base: str, check: Callable[[int], None]) -> Convert:
                 return np.array(_one_by_one(values), dtype)
             return found if dtype == np.float64 else _to_float32(found)
         if base not in ("byte", "bool") and not is_float and kinds == {int}:
-            least, greatest = INTEGER_RANGES[base]
-            if least <= min(values) and max(values) <= greatest:
+            minimum, maximum = INTEGER_RANGES[base]
+            if minimum <= min(values) and max(values) <= maximum:
                 return np.array(values, dtype)
         return np.array(_one_by_one(values), dtype)
 

@@ -88,13 +88,13 @@ class CvBridge:
         self, cmprs_img_msg: Any, desired_encoding: str = "passthrough"
     ) -> Pixels:
         """Returns the pixels of a CompressedImage (JPEG, PNG): `bgr8` or grey, or as desired."""
-        from PIL import Image as Picture
+        from PIL import Image as PilImage
         from PIL import UnidentifiedImageError
 
         try:
-            with Picture.open(BytesIO(bytes(cmprs_img_msg.data))) as picture:
-                is_grey = picture.mode in ("L", "1", "I;16", "I")
-                found = np.asarray(picture if is_grey else picture.convert("RGB"))
+            with PilImage.open(BytesIO(bytes(cmprs_img_msg.data))) as image:
+                is_grey = image.mode in ("L", "1", "I;16", "I")
+                found = np.asarray(image if is_grey else image.convert("RGB"))
         except (UnidentifiedImageError, OSError) as error:
             raise CvBridgeError(f"the image cannot be decoded: {error}") from None
         if is_grey:
@@ -108,14 +108,14 @@ class CvBridge:
 
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> Any:
         """Returns the CompressedImage of a grey or `bgr8` array, as `jpg` or `png`."""
-        from PIL import Image as Picture
+        from PIL import Image as PilImage
 
         if cvim.dtype != np.uint8 or cvim.ndim not in (2, 3):
             raise CvBridgeError(f"an array of {_kind_of(cvim)} cannot be compressed")
         file = BytesIO()
-        picture = Picture.fromarray(cvim if cvim.ndim == 2 else cvim[:, :, 2::-1])
+        image = PilImage.fromarray(cvim if cvim.ndim == 2 else cvim[:, :, 2::-1])
         header = Header(Time(0, 0), "")
-        picture.save(file, "JPEG" if dst_format in ("jpg", "jpeg") else dst_format.upper())
+        image.save(file, "JPEG" if dst_format in ("jpg", "jpeg") else dst_format.upper())
         return CompressedImage(header, dst_format, np.frombuffer(file.getvalue(), np.uint8))
 
 

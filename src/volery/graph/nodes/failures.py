@@ -51,7 +51,7 @@ def user_frames(error: BaseException) -> list[traceback.FrameSummary]:
     return [f for f in frames if not f.filename.startswith(_MACHINERY)]
 
 
-def place_of(error: BaseException) -> str:
+def location_of(error: BaseException) -> str:
     """Returns ` (FILE:LINE)` of the last user frame; empty without one."""
     if isinstance(error, SyntaxError) and error.filename:
         return f" ({Path(error.filename).name}:{error.lineno})"
@@ -85,11 +85,11 @@ def report_failure(graph: Graph, error: NodeError, *, is_raised: bool = True) ->
     name = error.node.strip("/").replace("/", ".")
     text = "\n".join([str(error), *getattr(error, "__notes__", ())])
     frames = [] if error.__cause__ is None else user_frames(error.__cause__)
-    place = (
+    location = (
         (frames[-1].filename, frames[-1].name, frames[-1].lineno or 0) if frames else ("", "", 0)
     )
     time_ns = error.time_ns
-    message: Any = log_message(name, time_ns, LoggingSeverity.FATAL, text, place)
+    message: Any = log_message(name, time_ns, LoggingSeverity.FATAL, text, location)
     graph.publish_at_end(graph.advertise(ROSOUT, LOG_TYPE), message)
     if not is_raised:
         logger = logging.getLogger(f"{PYTHON_LOGGER}.{name}")

@@ -21,7 +21,7 @@ from volery.graph.nodes import PYTHON_LOGGER
 ROSOUT = "/rosout"
 LOG_TYPE = "rcl_interfaces/msg/Log"
 
-Place = tuple[str, str, int]
+CodeLocation = tuple[str, str, int]
 """File, function and line of a call."""
 
 
@@ -51,9 +51,9 @@ class NodeLogger:
         self._publish = publish
         self._parent = parent
         self._level = LoggingSeverity.UNSET
-        self._last_ns: dict[Place, int] = {}
+        self._last_ns: dict[CodeLocation, int] = {}
         """Time of the last line of each statement that is throttled or logged once."""
-        self._seen: set[Place] = set()
+        self._seen: set[CodeLocation] = set()
         """Statements with `skip_first` that have been skipped."""
         self._python = logging.getLogger(f"{PYTHON_LOGGER}.{name}")
 
@@ -109,18 +109,18 @@ class NodeLogger:
         if not self.is_enabled_for(severity):
             return False
         frame = sys._getframe(2)
-        place = (frame.f_code.co_filename, frame.f_code.co_qualname, frame.f_lineno)
+        location = (frame.f_code.co_filename, frame.f_code.co_qualname, frame.f_lineno)
         now_ns = self._now_ns()
-        if options and not self._is_due(place, now_ns, **options):
+        if options and not self._is_due(location, now_ns, **options):
             return False
         python_log(self._python, self.name, now_ns, severity, str(message))
         if self._publish is not None:
-            self._publish(log_message(self.name, now_ns, severity, str(message), place))
+            self._publish(log_message(self.name, now_ns, severity, str(message), location))
         return True
 
     def _is_due(
         self,
-        place: Place,
+        location: CodeLocation,
         now_ns: int,
         *,
         once: bool = False,
@@ -128,17 +128,17 @@ class NodeLogger:
         skip_first: bool = False,
         throttle_time_source_type: Any = None,  # noqa: ARG002  # always simulated time
     ) -> bool:
-        if skip_first and place not in self._seen:
-            self._seen.add(place)
+        if skip_first and location not in self._seen:
+            self._seen.add(location)
             return False
-        last_ns = self._last_ns.get(place)
+        last_ns = self._last_ns.get(location)
         if last_ns is not None and last_ns <= now_ns:  # later times are from before a reset
             if once:
                 return False
             if throttle_duration_sec and now_ns - last_ns < ns_from_s(throttle_duration_sec):
                 return False
         if once or throttle_duration_sec:
-            self._last_ns[place] = now_ns
+            self._last_ns[location] = now_ns
         return True
 
     def get_state(self) -> Any:
@@ -150,9 +150,11 @@ class NodeLogger:
         self._last_ns, self._seen = dict(state[0]), set(state[1])
 
 
-def log_message(name: str, time_ns: int, severity: LoggingSeverity, text: str, place: Place) -> Any:
+def log_message(
+    name: str, time_ns: int, severity: LoggingSeverity, text: str, location: CodeLocation
+) -> Any:
     """Returns a `rcl_interfaces/msg/Log`; its file name has no folder, which varies."""
-    file, function, line = place
+    file, function, line = location
     stamp = time_from_ns(time_ns)
     log: type[Any] = message_type(LOG_TYPE)
     return log(stamp, int(severity), name, text, Path(file).name, function, line)

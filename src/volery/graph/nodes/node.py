@@ -30,7 +30,7 @@ from volery.graph.message_copies import copy_message, receive_message
 from volery.graph.messages import Published, message_type
 from volery.graph.nodes.coroutines import advance, is_coroutine, result_of
 from volery.graph.nodes.deferred_execution import DeferredExecutor
-from volery.graph.nodes.failures import add_frames, place_of
+from volery.graph.nodes.failures import add_frames, location_of
 from volery.graph.nodes.handles import (
     NodeEndpoints,
     NodePublisher,
@@ -484,7 +484,7 @@ class Node(ParameterMethods):
         client = f"; its last message of a client came from {self.__last_client}"
         failure = NodeError(
             f"node {self.full_name} failed at {now_ns / 1e9:.3f} s in its {occasion}: "
-            f"{what}{place_of(error)}{client if self.__last_client else ''}",
+            f"{what}{location_of(error)}{client if self.__last_client else ''}",
             node=self.full_name,
             time_ns=now_ns,
         )

@@ -40,9 +40,9 @@ def read_points(
     """Returns the points of a PointCloud2 as a structured array (N,).
 
     field_names: None reads all fields. skip_nans: leaves out points with a NaN, unless the cloud is
-    dense. uvs: places of the points to return. reshape_organized_cloud: returns (width, height) for
-    a cloud of several rows, as in ROS 2. Read-only where the cloud's data is. Raises `TypeError`
-    for another message, `ValueError` for unknown fields or too little data.
+    dense. uvs: indices of the points to return. reshape_organized_cloud: returns (width, height)
+    for a cloud of several rows, as in ROS 2. Read-only where the cloud's data is. Raises
+    `TypeError` for another message, `ValueError` for unknown fields or too little data.
     """
     _check(cloud)
     kind = dtype_from_fields(cloud.fields, cloud.point_step)

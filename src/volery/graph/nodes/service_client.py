@@ -16,7 +16,7 @@ from volery.graph.service_reply import ServiceReply
 
 Later = Callable[[Callable[[], None]], None]
 
-_MOST_LOOKS = 1000
+_MAX_WAITS = 1000
 """Limit of waits for a service at one simulated time; more are an endless loop."""
 
 
@@ -137,7 +137,7 @@ class Client:
         now_ns = self._graph.now_ns()
         count, last_ns = self._looks
         self._looks = (count + 1 if last_ns == now_ns else 1, now_ns)
-        if timeout_sec is None or count >= _MOST_LOOKS:
+        if timeout_sec is None or count >= _MAX_WAITS:
             raise GraphError(
                 f"service '{self.service}' has no server, and a callback cannot wait for one; "
                 "check service_is_ready() in a timer"

@@ -90,18 +90,18 @@ class _Frame:
         self.placements: deque[_Placement] = deque()
 
     def add(self, placement: _Placement) -> None:
-        """Stores a placement; older ones than the newest take their place by time."""
+        """Stores a placement; older ones than the newest are inserted by time."""
         kept = self.placements
         if self.is_static or not kept:
             kept.clear()
             kept.append(placement)
             return
         times = [known.time_ns for known in kept]
-        place = bisect_left(times, placement.time_ns)
-        if place < len(kept) and times[place] == placement.time_ns:
-            kept[place] = placement
+        index = bisect_left(times, placement.time_ns)
+        if index < len(kept) and times[index] == placement.time_ns:
+            kept[index] = placement
         else:
-            kept.insert(place, placement)
+            kept.insert(index, placement)
         while kept[0].time_ns < kept[-1].time_ns - CACHE_NS:
             kept.popleft()
 
@@ -116,15 +116,15 @@ class _Frame:
                 f"'{name}' at {time_ns / 1e9:.3f} s: known from {first_ns / 1e9:.3f} to "
                 f"{last_ns / 1e9:.3f} s"
             )
-        place = bisect_left([known.time_ns for known in kept], time_ns)
-        after = kept[place]
+        index = bisect_left([known.time_ns for known in kept], time_ns)
+        after = kept[index]
         if after.time_ns == time_ns:
             return after
-        before = kept[place - 1]
-        share = (time_ns - before.time_ns) / (after.time_ns - before.time_ns)
+        before = kept[index - 1]
+        fraction = (time_ns - before.time_ns) / (after.time_ns - before.time_ns)
         turn = rotations.multiply(rotations.conjugate(before.attitude), after.attitude)
-        part = rotations.exponential(share * rotations.logarithm(turn))
-        position = before.position + share * (after.position - before.position)
+        part = rotations.exponential(fraction * rotations.logarithm(turn))
+        position = before.position + fraction * (after.position - before.position)
         return _Placement(time_ns, position, rotations.multiply(before.attitude, part))
 
 

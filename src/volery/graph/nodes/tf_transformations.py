@@ -74,8 +74,8 @@ def quaternion_matrix(quaternion: ArrayLike) -> Array:
 def quaternion_from_matrix(matrix: ArrayLike) -> Array:
     """Returns x y z w of a matrix."""
     m = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    shares = [m[0, 0], m[1, 1], m[2, 2], m.trace()]
-    k = int(np.argmax(shares))  # the largest part, by which the others are divided
+    candidates = [m[0, 0], m[1, 1], m[2, 2], m.trace()]
+    k = int(np.argmax(candidates))  # the largest part, by which the others are divided
     if k == 3:
         parts = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1.0 + m.trace()]
         return rotations.normalize(parts)
@@ -94,7 +94,7 @@ def quaternion_about_axis(angle: float, axis: ArrayLike) -> Array:
 
 
 def quaternion_slerp(quat0: ArrayLike, quat1: ArrayLike, fraction: float) -> Array:
-    """Returns the quaternion between two others, by the shorter way."""
+    """Returns the quaternion between two others, along the shorter arc."""
     start = rotations.normalize(quat0)
     turn = rotations.logarithm(rotations.multiply(rotations.conjugate(start), quat1))
     return rotations.multiply(start, rotations.exponential(fraction * turn))

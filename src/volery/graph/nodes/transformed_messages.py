@@ -71,9 +71,9 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     if missing:
         raise ValueError(f"the cloud has no field {', '.join(missing)}")
     points = points.copy()
-    places = np.stack([points[name].astype(np.float64) for name in "xyz"], axis=-1)
+    positions = np.stack([points[name].astype(np.float64) for name in "xyz"], axis=-1)
     p = transform.transform.translation
-    moved = rotations.rotate(_rotation(transform), places) + np.array([p.x, p.y, p.z])
+    moved = rotations.rotate(_rotation(transform), positions) + np.array([p.x, p.y, p.z])
     for k, name in enumerate("xyz"):
         points[name] = moved[:, k]
     return PointCloud2(
@@ -104,9 +104,9 @@ def _rotation(transform: Any) -> Array:
     return np.array([q.x, q.y, q.z, q.w])
 
 
-def _moved(transform: Any, place: Any) -> Array:
+def _moved(transform: Any, position: Any) -> Array:
     p = transform.transform.translation
-    turned = rotations.rotate(_rotation(transform), [place.x, place.y, place.z])
+    turned = rotations.rotate(_rotation(transform), [position.x, position.y, position.z])
     return np.asarray(turned + np.array([p.x, p.y, p.z]))
 
 

@@ -51,9 +51,11 @@ class TagImages:
             MovingActor(f"tag{k}", "tag", shape, motion, is_flat=True)
             for k, motion in enumerate(self._motions)
         ]
-        reach = _APART_M * side
+        half_width = _APART_M * side
         self._scene = Scene(
-            Terrain.flat(2.0 * reach, 0.0, origin=(-reach, -reach)), None, threads=threads
+            Terrain.flat(2.0 * half_width, 0.0, origin=(-half_width, -half_width)),
+            None,
+            threads=threads,
         )
         self._scene.set_actors(MovingActors(actors))
         self._scene.set_bodies(

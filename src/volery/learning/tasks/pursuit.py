@@ -111,9 +111,9 @@ def _begin(flight: Flight, envs: NDArray[np.int64]) -> EnvironmentStart:
     shape = (PURSUERS + 1, 3)
     line = np.array([[-9.0, 3.0 * (k - 1), 0.0] for k in range(PURSUERS)] + [[3.0, 0.0, 0.0]])
     spread = np.array([[1.0, 0.7, 0.5]] * PURSUERS + [[5.0, 5.0, 0.0]])
-    place = line + draws.uniform(envs, -spread, spread, shape)
+    offset = line + draws.uniform(envs, -spread, spread, shape)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x, y, z = np.moveaxis(place, -1, 0)
+    x, y, z = np.moveaxis(offset, -1, 0)
     position = _CENTRE + np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
     flight.values[GOAL][envs] = position[:, EVADER:]
     flight.values[GAP][envs] = _gap(position)

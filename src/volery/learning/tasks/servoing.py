@@ -145,7 +145,7 @@ class _InImages:
             self._made[flight] = images
             weakref.finalize(flight, images.close)
         envs = np.arange(flight.num_envs)
-        pictures = images.render(
+        rendered = images.render(
             envs,
             position,
             attitude,
@@ -154,4 +154,4 @@ class _InImages:
             keys=noise_keys(flight),
             number=flight.decisions,
         )
-        return images.detect(pictures)
+        return images.detect(rendered)

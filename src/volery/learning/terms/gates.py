@@ -62,8 +62,8 @@ def draw_gates(
 ) -> Array:
     """Places gates one after the other from `start_map` (3,); returns headings (R,) to the first.
 
-    The way turns by up to `turn_rad` at each gate; heights differ by up to `height_m` from the
-    start's. Gates face along the way within 15 degrees.
+    The path turns by up to `turn_rad` at each gate; heights differ by up to `height_m` from the
+    start's. Gates face along the path within 15 degrees.
     """
     draw, count = flight.draws.uniform, num_gates + 1
     first = draw(envs, -math.pi, math.pi, (1,))

@@ -22,7 +22,7 @@ def line_offset(scale_m: float = 10.0, *, limit: float = 2.0) -> Observation:
 def progress(weight: float, max_speed_m_s: float = float("inf")) -> Reward:
     """Returns the speed along the line, m/s, at most `max_speed_m_s`, times the decision's length.
 
-    Without a limit this is the way along the line since the last decision, m.
+    Without a limit this is the distance along the line since the last decision, m.
     """
 
     def gained(flight: Flight) -> Array:
@@ -64,7 +64,7 @@ def crossed(length_m: float, reward: float) -> Termination:
 
 
 def along_m(flight: Flight) -> Array:
-    """Returns the way along the line (K, n), m."""
+    """Returns the distance along the line (K, n), m."""
     return _along(flight, flight.state.position_map, from_start=True)
 
 

@@ -58,16 +58,16 @@ def touched(reward: float = -5.0) -> Termination:
 
 
 def clearance(flight: Flight) -> Array:
-    """Returns the least distance (K, n), m, of each UAV's sphere to posts since the last decision.
+    """Returns each UAV's smallest distance (K, n), m, to posts since the last decision.
 
     Infinite without posts.
     """
     posts = flight.values[POSTS][:, None]
     start = flight.values[BEFORE][..., None, :2] - posts[..., :2]
-    way = (flight.state.position_map - flight.values[BEFORE])[..., None, :2]
-    length = np.maximum(np.sum(way * way, axis=-1), 1e-12)
-    along = np.clip(-np.sum(start * way, axis=-1) / length, 0.0, 1.0)
-    distance = np.linalg.norm(start + along[..., None] * way, axis=-1) - posts[..., 2]
+    path = (flight.state.position_map - flight.values[BEFORE])[..., None, :2]
+    length = np.maximum(np.sum(path * path, axis=-1), 1e-12)
+    along = np.clip(-np.sum(start * path, axis=-1) / length, 0.0, 1.0)
+    distance = np.linalg.norm(start + along[..., None] * path, axis=-1) - posts[..., 2]
     distance = np.where(posts[..., 2] > 0.0, distance, np.inf)
     return np.asarray(
         distance.min(axis=-1, initial=np.inf) - flight.airframe.body.collision_radius_m

@@ -21,7 +21,7 @@ VALIDATION_SEEDS = 1 << 40
 TEST_SEEDS = 1 << 41
 """First seed of `evaluate`: no training uses it or those after it."""
 TIME_LIMIT = "time_limit"
-_MOST_ENVS = 256
+_MAX_ENVS = 256
 _Z_95 = 1.959963984540054
 """Quantile of the normal distribution for a confidence of 95 %."""
 
@@ -60,7 +60,7 @@ class Evaluator:
         self.task = replace(task, curriculum=None)  # at full difficulty
         self.episodes = episodes
         self._seed = seed
-        envs = min(episodes, _MOST_ENVS)
+        envs = min(episodes, _MAX_ENVS)
         self.envs = TaskVectorEnv(self.task, envs, threads=threads)
         quota = np.full(envs, episodes // envs) + (np.arange(envs) < episodes % envs)
         self._quota = np.repeat(quota, task.num_agents)

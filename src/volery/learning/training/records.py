@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-_LEAST_WINDOW = 200
+_MIN_WINDOW = 200
 """Episodes, at least, of which the latest results are means."""
 
 
@@ -27,7 +27,7 @@ class Latest:
     @classmethod
     def of(cls, num_envs: int, terms: list[str]) -> Latest:
         """Returns an empty record for rewards named `terms`."""
-        window = max(_LEAST_WINDOW, num_envs)
+        window = max(_MIN_WINDOW, num_envs)
         return cls(
             window,
             deque(maxlen=window),

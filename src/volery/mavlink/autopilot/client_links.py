@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.mavlink.codec import Codec
 
-MOST_LINKS = 64
+MAX_LINKS = 64
 """Links of one vehicle; frames of further links are ignored (modelling choice)."""
 ALL_LINKS = 65535
 """Stands for all open links."""

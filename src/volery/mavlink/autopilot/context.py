@@ -13,8 +13,8 @@ from volery.mavlink.autopilot.parameters import Value, refusal
 from volery.mavlink.autopilot.state import AutopilotState
 from volery.mavlink.autopilot.vehicle import FlightState, Vector, Vehicle, VehicleInfo
 
-_COMPLAINT_NS = 1_000_000_000
-"""Time between two equal complaints (modelling choice): setpoints arrive fifty times a second."""
+_REFUSAL_PERIOD_NS = 1_000_000_000
+"""Time between two equal reports (modelling choice): setpoints arrive fifty times a second."""
 
 
 class AutopilotContext:
@@ -33,26 +33,28 @@ class AutopilotContext:
         self.earth = GeoReference(*build.origin)
         self.memory = AutopilotState()
         self.links = ClientLinks(system)
-        self.log = FlightLog(self.links, lambda problem: self.say(4, problem))
-        self._place: tuple[int, Vector] = (-1, (0.0, 0.0, 0.0))
+        self.log = FlightLog(self.links, lambda problem: self.report(4, problem))
+        self._geodetic: tuple[int, Vector] = (-1, (0.0, 0.0, 0.0))
         self._set_parameters(parameters or {})
 
-    def say(self, severity: int, text: str) -> None:
+    def report(self, severity: int, text: str) -> None:
         """Sends a status text to all links and logs it. severity: a MAV_SEVERITY."""
         self.log.note(self.memory.now_ns, severity, text)
         self.memory.text_number = self.memory.text_number % 65535 + 1
         for message in status_texts(severity, text, self.memory.text_number):
             self.links.send(message)
 
-    def complain(self, text: str) -> None:
-        """Says why a message without an answer is refused, each text once a second at most."""
-        said, now_ns = self.memory.complaints, self.memory.now_ns
-        if now_ns - said.get(text, -_COMPLAINT_NS) < _COMPLAINT_NS:
+    def report_refusal(self, text: str) -> None:
+        """Reports why a message without a response is refused, each text at most once a second."""
+        times_ns, now_ns = self.memory.reported_refusals, self.memory.now_ns
+        if now_ns - times_ns.get(text, -_REFUSAL_PERIOD_NS) < _REFUSAL_PERIOD_NS:
             return
-        for old in [one for one, time_ns in said.items() if now_ns - time_ns >= _COMPLAINT_NS]:
-            del said[old]
-        said[text] = now_ns
-        self.say(2, text)
+        for old in [
+            known for known, time_ns in times_ns.items() if now_ns - time_ns >= _REFUSAL_PERIOD_NS
+        ]:
+            del times_ns[old]
+        times_ns[text] = now_ns
+        self.report(2, text)
 
     def announce(self) -> None:
         """Reports a change of mode at once."""
@@ -73,11 +75,11 @@ class AutopilotContext:
 
     def geodetic(self) -> Vector:
         """Returns latitude, longitude, degrees, and altitude, m; computed once per state."""
-        time_ns, place = self._place
+        time_ns, position = self._geodetic
         if time_ns != self.state.time_ns:
-            place = self.earth.geodetic(self.state.position)
-            self._place = self.state.time_ns, place
-        return place
+            position = self.earth.geodetic(self.state.position)
+            self._geodetic = self.state.time_ns, position
+        return position
 
     def parameter(self, name: str) -> Value:
         """Returns the value of a parameter."""

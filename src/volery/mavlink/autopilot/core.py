@@ -14,14 +14,14 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import CommandError
-from volery.mavlink.autopilot.client_links import MOST_LINKS, LinkState
+from volery.mavlink.autopilot.client_links import MAX_LINKS, LinkState
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.logs.flight_logger import FlightLogger
 from volery.mavlink.autopilot.messages import streams
 from volery.mavlink.autopilot.modes import flight_tasks, mode_transitions
 from volery.mavlink.autopilot.parameters import Value
 from volery.mavlink.autopilot.protocols import calibration, message_handlers, requests
-from volery.mavlink.autopilot.protocols.mission_protocol import keep_transfers_going
+from volery.mavlink.autopilot.protocols.mission_protocol import update_transfers
 from volery.mavlink.autopilot.safety import failsafes
 from volery.mavlink.autopilot.state import Source
 from volery.mavlink.autopilot.vehicle import FlightState, Vehicle, VehicleInfo
@@ -53,7 +53,7 @@ class Autopilot:
         links = self.context.links.open
         self.context.memory.now_ns = now_ns
         if link not in links:
-            if len(links) >= MOST_LINKS:
+            if len(links) >= MAX_LINKS:
                 return
             links[link] = streams.begin(LinkState(link, profile), now_ns)
         for frame in self._framer.datagram(data):
@@ -85,7 +85,7 @@ class Autopilot:
         if state.time_ns >= memory.next_check_ns:
             memory.next_check_ns = state.time_ns + failsafes.PERIOD_NS
             failsafes.check(context, state)
-            keep_transfers_going(context)
+            update_transfers(context)
             calibration.update(context)
         flight_tasks.fly(context, state)
         self._logger.update()
@@ -114,7 +114,9 @@ class Autopilot:
         if kind in _COMMANDS and message.command in requests.FOR_ALL:
             return system in (0, self.context.system)
         if system == 0 and kind.startswith(_FOR_ONE):
-            self.context.complain(f"{kind} to system 0 ignored: this one is {self.context.system}")
+            self.context.report_refusal(
+                f"{kind} to system 0 ignored: this one is {self.context.system}"
+            )
             return False
         planner = _PLANNER if kind.startswith("MISSION_") else AUTOPILOT
         return system in (0, self.context.system) and component in (0, AUTOPILOT, planner)

@@ -27,7 +27,7 @@ _INJECT = "volery_interfaces/srv/InjectFault"
 _END_FAULT = "volery_interfaces/srv/EndFault"
 _TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE = "mavros_msgs/msg/AttitudeTarget"
-_NO_PLACE, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
+_NO_POSITION, _NO_VELOCITY, _NO_PUSH = 7, 7 << 3, 7 << 6
 _NO_YAW, _NO_YAW_RATE = 1024, 2048
 _NO_RATES, _NO_ATTITUDE = 7, 128
 _NOTHING = (0.0, 0.0, 0.0)
@@ -53,36 +53,36 @@ class GraphVehicle:
         """Implements `Vehicle.take_off`."""
         request = zero_message(f"{_TAKE_OFF_TO}_Request")
         request.altitude = height_m
-        return _ask(self._take_off, request)
+        return _call(self._take_off, request)
 
     def hold(self) -> str:
         """Implements `Vehicle.hold`."""
-        return _ask(self._clients["hold"])
+        return _call(self._clients["hold"])
 
     def land(self) -> str:
         """Implements `Vehicle.land`."""
-        return _ask(self._clients["land"])
+        return _call(self._clients["land"])
 
     def sink(self, speed: float) -> str:
         """Implements `Vehicle.sink`."""
         request = zero_message(f"{_LANDING_SPEED}_Request")
         request.speed = speed
-        return _ask(self._sink, request)
+        return _call(self._sink, request)
 
     def stop(self) -> str:
         """Implements `Vehicle.stop`."""
-        return _ask(self._clients["kill"])
+        return _call(self._clients["kill"])
 
     def go_to(self, position: Vector, yaw: float | None) -> str:
         """Implements `Vehicle.go_to`."""
         request = zero_message(f"{_GO_TO}_Request")
         request.position = Point(*position)
         request.yaw, request.keep_heading = yaw or 0.0, yaw is None
-        return _ask(self._go_to, request)
+        return _call(self._go_to, request)
 
     def steer(self, velocity: Vector, yaw: float | None, yaw_rate: float) -> None:
         """Implements `Vehicle.steer`."""
-        self._steer(_NO_PLACE | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
+        self._steer(_NO_POSITION | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
 
     def follow(
         self,
@@ -97,7 +97,7 @@ class GraphVehicle:
 
     def push(self, acceleration: Vector, yaw: float | None, yaw_rate: float) -> None:
         """Implements `Vehicle.push`."""
-        self._steer(_NO_PLACE | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
+        self._steer(_NO_POSITION | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
 
     def tilt(self, attitude: Turn, thrust: float) -> None:
         """Implements `Vehicle.tilt`."""
@@ -117,13 +117,13 @@ class GraphVehicle:
         """Implements `Vehicle.fail`."""
         request = zero_message(f"{_INJECT}_Request")
         request.fault = json.dumps({**fault, "uav": self._uav})
-        return _ask(self._inject, request)
+        return _call(self._inject, request)
 
     def end_fault(self, fault: dict[str, Any]) -> str:
         """Implements `Vehicle.end_fault`."""
         request = zero_message(f"{_END_FAULT}_Request")
         request.fault = json.dumps({**fault, "uav": self._uav})
-        return _ask(self._end_fault, request)
+        return _call(self._end_fault, request)
 
     def _steer(
         self,
@@ -142,15 +142,15 @@ class GraphVehicle:
         message.yaw, message.yaw_rate = yaw or 0.0, yaw_rate
         request = zero_message(f"{_SET_TARGET}_Request")
         request.target = message
-        _ask(self._target, request)
+        _call(self._target, request)
 
     def _turn(self, message: Any) -> None:
         request = zero_message(f"{_SET_ATTITUDE}_Request")
         request.target = message
-        _ask(self._attitude, request)
+        _call(self._attitude, request)
 
 
-def _ask(client: Any, request: Any = None) -> str:
+def _call(client: Any, request: Any = None) -> str:
     """Calls a service; returns why it failed, empty on success."""
     try:
         response = client.call(request)
@@ -161,27 +161,27 @@ def _ask(client: Any, request: Any = None) -> str:
 
 def build_of(node: Node) -> VehicleInfo:
     """Returns the constant properties of the UAV. Raises `GraphError` if the service fails."""
-    told = node.create_client(_GET_VEHICLE_INFO, "get_vehicle_info").call()
-    if not told.success:
-        raise GraphError(told.message)
+    info = node.create_client(_GET_VEHICLE_INFO, "get_vehicle_info").call()
+    if not info.success:
+        raise GraphError(info.message)
     return VehicleInfo(
-        told.airframe,
-        told.rotors,
-        told.hover_thrust,
-        told.speed,
-        told.climb,
-        told.descent,
-        told.tilt,
-        told.battery_cells,
-        told.battery_capacity,
-        (told.latitude, told.longitude, told.altitude),
+        info.airframe,
+        info.rotors,
+        info.hover_thrust,
+        info.speed,
+        info.climb,
+        info.descent,
+        info.tilt,
+        info.battery_cells,
+        info.battery_capacity,
+        (info.latitude, info.longitude, info.altitude),
     )
 
 
 def state_of(message: Any) -> FlightState:
     """Converts a FlightState message."""
     stamp, pose = message.header.stamp, message.pose
-    place, turn = pose.position, pose.orientation
+    position, turn = pose.position, pose.orientation
     v, w, a = message.velocity, message.angular_velocity, message.acceleration
     has_battery = math.isfinite(message.battery_charge)
     return FlightState(
@@ -189,7 +189,7 @@ def state_of(message: Any) -> FlightState:
         message.mode,
         message.airborne,
         message.crashed,
-        (place.x, place.y, place.z),
+        (position.x, position.y, position.z),
         (turn.x, turn.y, turn.z, turn.w),
         (v.x, v.y, v.z),
         (w.x, w.y, w.z),

@@ -52,7 +52,7 @@ class MissionTransfer:
     items: list[MissionItem] = field(default_factory=list)
     time_ns: int = 0
     """Time of the last message of the other side."""
-    asked_ns: int = 0
+    requested_ns: int = 0
     retries: int = 0
     first: int = 0
     """Item marked as the current one, with which the mission starts."""
@@ -148,7 +148,7 @@ class AutopilotState:
     landed_ns: int = 0
     take_off_height: float = math.nan
     """Requested height above the ground of the next take-off, m."""
-    take_off_place: tuple[float, float] | None = None
+    take_off_position: tuple[float, float] | None = None
     """Requested position of the next take-off, m, map, to which the UAV flies after its climb."""
     take_off_goal: Vector | None = None
     """Goal of the current take-off from the ground, m, map."""
@@ -176,13 +176,13 @@ class AutopilotState:
     """Sender of the last complete upload and the number of its last item, by MAV_MISSION_TYPE."""
     mission: Mission = field(default_factory=Mission)
     leg: MissionLeg | None = None
-    way_home: ReturnState | None = None
+    return_state: ReturnState | None = None
     sticks: ManualInput = field(default_factory=ManualInput)
     climb_thrust: float = 0.0
     """Integral of the altitude mode, as a fraction of the hover thrust."""
     altitude_target: float = math.nan
     offboard: Offboard = field(default_factory=Offboard)
-    ground_heard_ns: int = -1
+    ground_heartbeat_ns: int = -1
     """Time of the last heartbeat of a ground station; -1: never."""
     fix_ns: int = 0
     """Time of the last satellite fix; always current for UAVs without a receiver."""
@@ -209,8 +209,8 @@ class AutopilotState:
     text_number: int = 0
     """Number of the last STATUSTEXT, 1 to 65535."""
     refused_messages: set[str] = field(default_factory=set)
-    """Messages that are not supported, and of which a client has been told."""
-    complaints: dict[str, int] = field(default_factory=dict)
+    """Unsupported messages that have been reported to their client."""
+    reported_refusals: dict[str, int] = field(default_factory=dict)
     """Refusals of messages without an answer, and when they were reported."""
 
     @property

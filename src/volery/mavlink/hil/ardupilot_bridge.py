@@ -29,7 +29,7 @@ from volery.mavlink.hil.ardupilot_json import (
     State,
     motors_of,
     parse_servos,
-    shares,
+    rotor_fractions,
     state_line,
 )
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
@@ -284,7 +284,7 @@ class _Session(asyncio.DatagramProtocol):
 
     def _obey(self, servos: Servos) -> None:
         self._number = servos.number
-        self._lock_step.go_on(shares(servos.pwm, self._motors))
+        self._lock_step.go_on(rotor_fractions(servos.pwm, self._motors))
 
 
 def _state_of(news: News) -> State | None:

@@ -72,7 +72,7 @@ def parse_servos(data: bytes) -> Servos | None:
 def state_line(time_s: float, state: State) -> bytes:
     """Returns the line of a state at a time of the simulator's clock."""
     x, y, z, w = q_ned_frd_of_enu_flu(state.attitude)
-    told: dict[str, object] = {
+    fields: dict[str, object] = {
         "timestamp": time_s * _AHEAD,
         "imu": {"gyro": frd_of_flu(state.rates), "accel_body": frd_of_flu(state.force)},
         "position": ned_of_enu(state.position),
@@ -80,10 +80,10 @@ def state_line(time_s: float, state: State) -> bytes:
         "velocity": ned_of_enu(state.velocity),
     }
     if state.range_m is not None:
-        told["rng_1"] = state.range_m
+        fields["rng_1"] = state.range_m
     if state.battery is not None:
-        told["battery"] = {"voltage": state.battery[0], "current": state.battery[1]}
-    return b"\n" + json.dumps(told, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+        fields["battery"] = {"voltage": state.battery[0], "current": state.battery[1]}
+    return b"\n" + json.dumps(fields, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
 def motors_of(rotors: RotorLayout) -> tuple[int, ...]:
@@ -102,7 +102,7 @@ def motors_of(rotors: RotorLayout) -> tuple[int, ...]:
     raise BridgeError("ArduCopter flies quadrotors with arms as an X or a plus here")
 
 
-def shares(pwm: Sequence[int], motors: Sequence[int]) -> list[float]:
+def rotor_fractions(pwm: Sequence[int], motors: Sequence[int]) -> list[float]:
     """Returns each rotor's fraction of full speed."""
     span = _PWM_FULL - _PWM_OFF
     return [min(max((pwm[k] - _PWM_OFF) / span, 0.0), 1.0) for k in motors]
@@ -110,7 +110,7 @@ def shares(pwm: Sequence[int], motors: Sequence[int]) -> list[float]:
 
 def _nearest(bearing: float, motors: Sequence[float]) -> int:
     """Returns the motor within `_NEAR_DEG` of a bearing; -1 if there is none."""
-    for k, place in enumerate(motors):
-        if abs((bearing - place + 180.0) % 360.0 - 180.0) < _NEAR_DEG:
+    for k, motor_bearing in enumerate(motors):
+        if abs((bearing - motor_bearing + 180.0) % 360.0 - 180.0) < _NEAR_DEG:
             return k
     return -1

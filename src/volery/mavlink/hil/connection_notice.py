@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 NOTICE_S = 5.0
 """Wall time after a bridge has opened, s; PX4 connects within one second of its start."""
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 _log = logging.getLogger(__name__)
 
 
@@ -47,8 +47,8 @@ class ConnectionNotice:
 
 def notice(what: str, missing: Mapping[str, str], hint: str) -> str:
     """Returns one line with the UAVs, the addresses and how to start an autopilot."""
-    places = [f"{uav} ({place})" for uav, place in missing.items()]
-    more = len(places) - _MOST_NAMED
-    named = ", ".join(places[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-    stand = "it stays on the ground" if len(places) == 1 else "they stay on the ground"
+    entries = [f"{uav} ({address})" for uav, address in missing.items()]
+    more = len(entries) - _MAX_NAMED
+    named = ", ".join(entries[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
+    stand = "it stays on the ground" if len(entries) == 1 else "they stay on the ground"
     return f"no {what} yet for {named}: {stand} until one connects; {hint}"

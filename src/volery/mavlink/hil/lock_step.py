@@ -38,7 +38,7 @@ _GLANCE_S = 0.05
 _SLEEP_S = 0.5
 """Wall time of silence after which an autopilot may be asleep, s, at most a fifth of its timeout.
 """
-_LONGEST_SLEEP = 6.0
+_MAX_SLEEP_FACTOR = 6.0
 """Longest sleep, as a factor on the timeout, wall time."""
 _log = logging.getLogger(__name__)
 
@@ -106,19 +106,19 @@ class LockStepSession:
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
         self._rotors = f"/{uav}/rotor_speeds"
-        meeting = f"/volery/lock_step/{kind}_of_{uav}"
-        self._done = f"{meeting}/done"
+        barrier = f"/volery/lock_step/{kind}_of_{uav}"
+        self._done = f"{barrier}/done"
         self._pending = False
         self._since_s = 0.0
         """Wall time at which the current exchange began."""
-        self._is_unsayable = False
+        self._has_warned = False
         """Whether a failed `send_sensors` has been logged."""
         self._asleep_since_s: float | None = None
         """Wall time since which time goes on without the autopilot's answers."""
         self._period_s = period_ns / NS_PER_S
         self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
-        self._boxes: dict[str, SubscriptionQueue] = {
+        self._queues: dict[str, SubscriptionQueue] = {
             name: self._session.subscribe(f"/{uav}/{name}", msgtype, depth=1, wake=_nothing)
             for name, msgtype in topics.items()
         }
@@ -127,7 +127,7 @@ class LockStepSession:
         self._clock = message_type(_CLOCK)
         self._session.advertise(self._rotors, _SPEEDS)
         self._session.advertise(self._done, _CLOCK)
-        self._go = self._session.subscribe(f"{meeting}/go", _CLOCK, depth=1, wake=self._wake)
+        self._go = self._session.subscribe(f"{barrier}/go", _CLOCK, depth=1, wake=self._wake)
         self._join(f"{kind}_of_{uav}", period_ns)
 
     @property
@@ -140,17 +140,17 @@ class LockStepSession:
         """Whether the simulation waits for `go_on`."""
         return self._pending
 
-    def turn_rotors(self, shares: Sequence[float]) -> None:
+    def turn_rotors(self, fractions: Sequence[float]) -> None:
         """Requests rotor speeds as fractions of full speed, in the order of the airframe."""
-        self._publish((self._rotors, self._asked(shares)))
+        self._publish((self._rotors, self._speeds_message(fractions)))
 
-    def go_on(self, shares: Sequence[float] | None = None) -> None:
-        """Ends the exchange and requests rotor speeds, `shares` as in `turn_rotors`.
+    def go_on(self, fractions: Sequence[float] | None = None) -> None:
+        """Ends the exchange and requests rotor speeds, `fractions` as in `turn_rotors`.
 
         Without an exchange only the speeds are requested.
         """
-        messages = [] if shares is None else [(self._rotors, self._asked(shares))]
-        if shares is not None:
+        messages = [] if fractions is None else [(self._rotors, self._speeds_message(fractions))]
+        if fractions is not None:
             self._asleep_since_s = None
         if self._pending:
             self._pending = False
@@ -198,13 +198,13 @@ class LockStepSession:
         try:
             return self._autopilot.send_sensors(time_ns, self._news())
         except (ArithmeticError, ValueError, struct.error) as error:  # such as an infinite fix
-            if not self._is_unsayable:
-                self._is_unsayable = True
+            if not self._has_warned:
+                self._has_warned = True
                 _log.warning("%s: cannot send sensor values to its autopilot: %s", self._uav, error)
             return False
 
     def _news(self) -> News:
-        found = {name: box.take() for name, box in self._boxes.items()}
+        found = {name: queue.take() for name, queue in self._queues.items()}
         return {name: published[-1].message for name, published in found.items() if published}
 
     async def _watch_silence(self) -> None:
@@ -227,7 +227,7 @@ class LockStepSession:
         if since_s is None:
             sleeps = silent_s >= min(_SLEEP_S, 0.2 * timeout_s)
         else:
-            sleeps = time.monotonic() - since_s < _LONGEST_SLEEP * timeout_s
+            sleeps = time.monotonic() - since_s < _MAX_SLEEP_FACTOR * timeout_s
         if sleeps and self._autopilot.may_sleep:
             self._go_on_without()
         elif self._timeout_policy.drops and silent_s >= timeout_s:
@@ -251,8 +251,8 @@ class LockStepSession:
         self._autopilot.drop()
         self.go_on()
 
-    def _asked(self, shares: Sequence[float]) -> Any:
-        return self._speeds(layout=self._layout, data=np.array(shares, np.float32))
+    def _speeds_message(self, fractions: Sequence[float]) -> Any:
+        return self._speeds(layout=self._layout, data=np.array(fractions, np.float32))
 
     def _publish(self, *messages: tuple[str, Any]) -> None:
         with contextlib.suppress(GraphError):  # the simulation is closing
@@ -270,7 +270,7 @@ def _nothing() -> None:
     """Does nothing: no request waits for this response."""
 
 
-def _answered(answer: Any) -> None:
+def _answered(response: Any) -> None:
     """Logs an error if the request to join was refused."""
-    if not getattr(answer, "success", False):
-        _log.error("no lock step: %s", getattr(answer, "message", answer))
+    if not getattr(response, "success", False):
+        _log.error("no lock step: %s", getattr(response, "message", response))

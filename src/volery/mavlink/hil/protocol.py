@@ -30,7 +30,7 @@ _GENERIC, _NO_AUTOPILOT = 0, 8
 _LOCK_STEP = 1
 """Flag of HIL_ACTUATOR_CONTROLS: PX4 was built to use the simulator's time."""
 _GAUSS_A_TESLA = 1e4
-_MOST_CM_S = 32767
+_MAX_SPEED_CM_S = 32767
 
 
 class Inertial(NamedTuple):
@@ -81,7 +81,7 @@ class HilLink:
         self._codec = Codec(system, SIMULATOR)
         self._framer, self._parser = Framer(), Parser()
         self._sequence = 0
-        self.spoken = False
+        self.has_received = False
         """Whether any frame has arrived."""
         self.locked = False
         """Whether PX4 answers in lock step, so that the simulation waits for it."""
@@ -99,9 +99,9 @@ class HilLink:
 
     def feed(self, data: bytes) -> list[Actuators]:
         """Returns the actuator outputs in received bytes; other messages need no answer."""
-        answers = []
+        outputs = []
         for frame in self._framer.feed(data):
-            self.spoken = True
+            self.has_received = True
             message = self._parser.decode(frame.data)
             if message is None or message.get_type() != "HIL_ACTUATOR_CONTROLS":
                 continue
@@ -111,8 +111,8 @@ class HilLink:
                 for part in message.controls
             )
             armed = bool(message.mode & _ARMED)
-            answers.append(Actuators(controls, armed, 1000 * message.time_usec))
-        return answers
+            outputs.append(Actuators(controls, armed, 1000 * message.time_usec))
+        return outputs
 
     def _pack(self, message: object) -> bytes:
         self._sequence = (self._sequence + 1) % 256
@@ -146,18 +146,18 @@ class HilLink:
     def _gps(self, time_us: int, fix: Fix) -> bytes:
         seen = math.isfinite(fix.latitude)
         north, east, down = (
-            min(max(round(100.0 * part), -_MOST_CM_S), _MOST_CM_S)
+            min(max(round(100.0 * part), -_MAX_SPEED_CM_S), _MAX_SPEED_CM_S)
             for part in ned_of_enu(fix.velocity)
         )
         speed = round(math.hypot(north, east))
         course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
-        place = (fix.latitude, fix.longitude, fix.altitude) if seen else (0.0, 0.0, 0.0)
+        position = (fix.latitude, fix.longitude, fix.altitude) if seen else (0.0, 0.0, 0.0)
         message = dialect().MAVLink_hil_gps_message(
             time_us,
             3 if seen else 0,
-            round(place[0] * 1e7),
-            round(place[1] * 1e7),
-            round(place[2] * 1e3),
+            round(position[0] * 1e7),
+            round(position[1] * 1e7),
+            round(position[2] * 1e3),
             min(round(100.0 * fix.horizontal_m), 65535) if seen else 65535,
             min(round(100.0 * fix.vertical_m), 65535) if seen else 65535,
             min(speed, 65534),

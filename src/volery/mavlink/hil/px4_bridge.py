@@ -26,14 +26,14 @@ from volery.graph.session import Gateway
 from volery.mavlink.codec import dialect
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
 from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy, uavs_with
-from volery.mavlink.hil.px4_processes import MOST_INSTANCES
+from volery.mavlink.hil.px4_processes import MAX_INSTANCES
 from volery.mavlink.hil.session import HilSession
 from volery.mavlink.links.connection import why_not
 
 PORT = 4560
-_MOST_UNSENT_BYTES = 1 << 16
+_MAX_UNSENT_BYTES = 1 << 16
 """Largest number of unsent bytes for a PX4 that does not read, besides the kernel's buffers."""
-_MOST_CONNECTIONS = 4
+_MAX_CONNECTIONS = 4
 """Connections to one UAV's port; all but one end as soon as the server sees them."""
 _log = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ class Px4Bridge:
     @property
     def connected(self) -> tuple[str, ...]:
         """UAVs whose PX4 is connected."""
-        return tuple(session.uav for session in self._sessions if session.taken)
+        return tuple(session.uav for session in self._sessions if session.is_connected)
 
     @property
     def ports(self) -> tuple[int, ...]:
@@ -118,14 +118,14 @@ class Px4Bridge:
         return {
             session.uav: self.address(number)
             for number, session in enumerate(self._sessions)
-            if not session.taken
+            if not session.is_connected
         }
 
     async def _listen(self, session: HilSession, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
             listener = open_listener(
-                self._host, port, f"{session.uav}: PX4", max_connections=_MOST_CONNECTIONS
+                self._host, port, f"{session.uav}: PX4", max_connections=_MAX_CONNECTIONS
             )
             server = await loop.create_server(lambda: _Connection(session, listener), sock=listener)
         except (OSError, OverflowError) as error:
@@ -158,7 +158,7 @@ class _Connection(asyncio.Protocol):
     def send(self, data: bytes) -> bool:
         """Implements `HilConnection.send`; drops whole frames for a PX4 that does not read."""
         self._flush()
-        if len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
+        if len(self._unsent) + len(data) > _MAX_UNSENT_BYTES:
             return False
         self._unsent += data
         self._flush()
@@ -181,9 +181,9 @@ class _Connection(asyncio.Protocol):
         """Implements asyncio's method."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if self._session.taken and not self._session.has_received:
-            self._session.give_way()
-        if self._session.taken:
+        if self._session.is_connected and not self._session.has_received:
+            self._session.end_unproven()
+        if self._session.is_connected:
             uav = self._session.uav
             _log.warning("%s: its PX4 is connected already; another connection is closed", uav)
             transport.abort()
@@ -214,7 +214,7 @@ class _Connection(asyncio.Protocol):
 def how_to_start(count: int, port: int) -> str:
     """Returns the command that starts PX4s for `port` and following."""
     first = port - PORT
-    if first < 0 or first + count > MOST_INSTANCES:
+    if first < 0 or first + count > MAX_INSTANCES:
         return f"PX4's instances connect to ports {PORT} and following"
     shift = f" --first {first}" if first else ""
     return f"start with: volery px4 --px4-dir PX4-Autopilot --count {count}{shift}"

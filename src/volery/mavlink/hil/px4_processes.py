@@ -28,13 +28,13 @@ from volery.core.whole_files import open_new
 AIRFRAME = "none_iris"
 """PX4's airframe 10016: an Iris with an external simulator."""
 FIRST_PORT = 4560
-_PLACES = ("build/px4_sitl_default", "", "build/px4_sitl_nolockstep")
+_BUILD_PATHS = ("build/px4_sitl_default", "", "build/px4_sitl_nolockstep")
 """Paths below the folder: PX4's sources, a build's folder or an installation."""
 _LOOK_S = 0.2
-_FAREWELL_S = 3.0
+_EXIT_TIMEOUT_S = 3.0
 """Wall time in which an instance may exit by itself."""
-_LINES_TOLD = 5
-MOST_INSTANCES = 254
+_NUM_REPORTED_LINES = 5
+MAX_INSTANCES = 254
 """Limit of MAVLink's system ids: instance i has i + 1; 255 is a ground station's."""
 _ESTABLISHED = "01"
 _log = logging.getLogger(__name__)
@@ -55,14 +55,15 @@ def find_px4(folder: Path) -> Px4Build:
     """
     if not folder.is_dir():
         raise BridgeError(f"{folder}: no such folder; --px4-dir needs the folder of PX4-Autopilot")
-    for place in _PLACES:
-        build = Px4Build(folder / place / "bin/px4", folder / place / "etc")
+    for path in _BUILD_PATHS:
+        build = Px4Build(folder / path / "bin/px4", folder / path / "etc")
         if build.binary.is_file():
             _check(build)
             return Px4Build(build.binary.resolve(), build.data.resolve())
+    missing = folder / _BUILD_PATHS[0] / "bin/px4"
     raise BridgeError(
-        f"{folder} holds no PX4 for simulations: {folder / _PLACES[0] / 'bin/px4'} is missing; "
-        "build it there with `make px4_sitl_default`"
+        f"{folder} holds no PX4 for simulations: {missing} is missing; build it "
+        "there with `make px4_sitl_default`"
     )
 
 
@@ -95,8 +96,8 @@ class Px4Instances:
         speed: float | None = None,
         parameters: Sequence[Mapping[str, float]] = (),
     ) -> None:
-        if count < 1 or first < 0 or first + count > MOST_INSTANCES:
-            last = MOST_INSTANCES - 1
+        if count < 1 or first < 0 or first + count > MAX_INSTANCES:
+            last = MAX_INSTANCES - 1
             raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {last} are allowed")
         self._build = build
         self._numbers = range(first, first + count)
@@ -130,14 +131,14 @@ class Px4Instances:
         if self._monitor.is_alive():
             self._monitor.join()
         for instance in self._instances:
-            instance.ask_to_end()
+            instance.request_exit()
         for instance in self._instances:
             instance.end()
         self._instances.clear()
         if self._work_dir is None and self._folder.name:
             shutil.rmtree(self._folder, ignore_errors=True)
 
-    def words_of(self, number: int) -> str:
+    def output_of(self, number: int) -> str:
         """Returns an instance's last output, indented lines; empty for an unknown instance."""
         found = [one for one in self._instances if one.number == number]
         return "".join(f"\n  {line}" for one in found for line in one.lines())
@@ -158,7 +159,7 @@ class Px4Instances:
             links = established_ports()
             for instance in self._instances:
                 if instance.has_ended:
-                    self.failure = instance.last_words()
+                    self.failure = instance.exit_report()
                     _log.error("%s", self.failure)
                     self._ended.set()
                     return
@@ -208,7 +209,7 @@ class _Instance:
         self._was_linked = linked
         return left
 
-    def last_words(self) -> str:
+    def exit_report(self) -> str:
         """Returns the exit code and the last output."""
         code = None if self._process is None else self._process.returncode
         lines = self.lines()
@@ -218,11 +219,11 @@ class _Instance:
     def lines(self) -> list[str]:
         """Returns the last lines of output."""
         try:
-            return self._output.read_text(errors="replace").splitlines()[-_LINES_TOLD:]
+            return self._output.read_text(errors="replace").splitlines()[-_NUM_REPORTED_LINES:]
         except OSError:
             return []
 
-    def ask_to_end(self) -> None:
+    def request_exit(self) -> None:
         """Asks the process to exit."""
         self._signal(signal.SIGINT)
 
@@ -232,7 +233,7 @@ class _Instance:
             return
         self._signal(signal.SIGINT)
         try:
-            self._process.wait(_FAREWELL_S)
+            self._process.wait(_EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._signal(signal.SIGKILL)
             self._process.wait()
@@ -246,15 +247,15 @@ class _Instance:
 
 def _environment(host: str, speed: float | None) -> dict[str, str]:
     """Returns the environment of PX4's start scripts; only parameters pass of PX4_ variables."""
-    kept = {
+    environment = {
         name: value
         for name, value in os.environ.items()
         if not name.startswith("PX4_") or name.startswith("PX4_PARAM_")
     }
-    kept |= {"PX4_SIM_MODEL": AIRFRAME, "PX4_SIM_HOSTNAME": host}
+    environment |= {"PX4_SIM_MODEL": AIRFRAME, "PX4_SIM_HOSTNAME": host}
     if speed not in (None, 1.0):  # PX4's script needs the program bc for it
-        kept["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
-    return kept
+        environment["PX4_SIM_SPEED_FACTOR"] = f"{speed:g}"
+    return environment
 
 
 def _parameter_variables(parameters: Mapping[str, float]) -> dict[str, str]:

@@ -22,7 +22,7 @@ from volery.mavlink.links.serial_line import SerialLine
 BAUD = 921600
 """HIL_SENSOR 250 times a second alone takes 190 kbit/s."""
 _BEAT_S = 1.0
-_LEAST_BAUD = 230400
+_MIN_BAUD = 230400
 
 
 class Px4SerialBridge:
@@ -63,9 +63,9 @@ class Px4SerialBridge:
     async def start(self, gateway: Gateway) -> None:
         """Opens the line. Raises `BridgeError` if that fails or no UAV is left."""
         dialect()
-        if self._baud < _LEAST_BAUD:
+        if self._baud < _MIN_BAUD:
             raise BridgeError(
-                f"{self._path}: {self._baud} baud is too slow for HIL; use {_LEAST_BAUD} or more"
+                f"{self._path}: {self._baud} baud is too slow for HIL; use {_MIN_BAUD} or more"
             )
         uavs = uavs_with(gateway, "imu")
         flown = uavs_with(gateway, "rotor_speeds")

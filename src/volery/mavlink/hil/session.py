@@ -59,14 +59,14 @@ class HilSession:
         )
 
     @property
-    def taken(self) -> bool:
+    def is_connected(self) -> bool:
         """Whether a PX4 is connected."""
         return self._connection is not None
 
     @property
     def has_received(self) -> bool:
         """Whether a MAVLink frame has arrived over the current connection."""
-        return self.taken and self._link.spoken
+        return self.is_connected and self._link.has_received
 
     def take(self, connection: HilConnection) -> Callable[[bytes], None]:
         """Attaches a new PX4; returns the function that takes the bytes it sends."""
@@ -113,7 +113,7 @@ class HilSession:
         if self._connection is None or sensed is None:
             return False
         self._connection.send(self._link.encode_exchange(time_ns, sensed))
-        return self._link.locked and self.taken
+        return self._link.locked and self.is_connected
 
     @property
     def may_sleep(self) -> bool:
@@ -124,7 +124,7 @@ class HilSession:
         """Implements `ExternalAutopilot.on_reset`: a PX4 cannot go back in time."""
         self._end("the simulation was reset and its PX4 must restart")
 
-    def give_way(self) -> None:
+    def end_unproven(self) -> None:
         """Ends the connection of a client that has sent no MAVLink frame, for another one."""
         self._end("the connected client has sent no MAVLink; another connection replaces it")
 
@@ -144,22 +144,22 @@ class HilSession:
                 self._take_in(data)
 
     def _take_in(self, data: bytes) -> None:
-        answers = self._link.feed(data)
-        if not self._link.spoken:
+        outputs = self._link.feed(data)
+        if not self._link.has_received:
             self._noise += len(data)
             if self._noise > _NOISE_BYTES and not self._has_warned:
                 self._has_warned = True
                 _log.warning(
                     "%s: the connected client does not send MAVLink; connect a PX4", self.uav
                 )
-        for actuators in answers:
+        for actuators in outputs:
             self._is_armed = actuators.armed
             if actuators.time_ns >= self._lock_step.time_ns:
-                self._lock_step.go_on(_shares(actuators))
+                self._lock_step.go_on(_rotor_fractions(actuators))
             else:
-                self._lock_step.turn_rotors(_shares(actuators))
+                self._lock_step.turn_rotors(_rotor_fractions(actuators))
 
 
-def _shares(actuators: Actuators) -> Sequence[float]:
+def _rotor_fractions(actuators: Actuators) -> Sequence[float]:
     """Returns the requested fractions of the rotors' full speed."""
     return [max(0.0, part) for part in actuators.controls] if actuators.armed else _STILL

@@ -10,7 +10,7 @@ from volery.mavlink.links.rate_limits import RateAccount
 from volery.mavlink.links.signing import signing_of
 from volery.mavlink.links.vehicle_registry import VehicleRegistry
 
-_NOBODY = 0
+_NO_SYSTEM = 0
 """Recipient of frames for a vehicle that does not exist, so that they prove a client only once."""
 
 
@@ -29,7 +29,7 @@ class MavlinkConnection:
         account: RateAccount | None = None,
     ) -> None:
         self.number = number
-        self.has_spoken = False
+        self.has_received = False
         """Whether a valid frame has arrived."""
         self._account = account
         self._signing = signing_of(key, number)
@@ -52,10 +52,10 @@ class MavlinkConnection:
         for frame in filter(self._signing.is_genuine, frames):
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             addressed = self._systems if target == 0 else self._systems & {target}
-            recipients = self._signing.recipients(frame, addressed or {_NOBODY})
+            recipients = self._signing.recipients(frame, addressed or {_NO_SYSTEM})
             if not recipients:
                 continue
-            self.has_spoken = True
+            self.has_received = True
             chosen = addressed.intersection(recipients)
             cost += max(0, len(chosen) - 1)
             for system in chosen:

@@ -18,7 +18,7 @@ _FRAMES_PER_S_AND_VEHICLE = 20.0
 """Minimum rate per vehicle: setpoints for all vehicles of a large swarm over one connection."""
 _BURST_FRAMES = 500.0
 """Size of an account: a mission of many waypoints, all parameters."""
-_SHORTEST_PAUSE_S = 0.05
+_MIN_PAUSE_S = 0.05
 """Shortest pause of an overdrawn client, so that few long turns read it, not one turn per frame."""
 _BYTES_PER_NOISE = 24
 """Bytes outside frames that cost as much as a frame: each is a possible start of one."""
@@ -75,7 +75,7 @@ class RateAccount:
         self._limits.note(self, is_overdrawn=self._frames < 0.0)
         if self._frames >= 0.0:
             return 0.0
-        return max(_SHORTEST_PAUSE_S, -self._frames / self._limits.rate)
+        return max(_MIN_PAUSE_S, -self._frames / self._limits.rate)
 
     def close(self) -> None:
         """Removes the client."""

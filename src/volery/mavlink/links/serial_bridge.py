@@ -38,7 +38,7 @@ class MavlinkSerial:
         self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
         self._connection = MavlinkConnection(self._fleet, self._line.number, GROUND, self._key)
         self._fleet.look()
-        self._looks = asyncio.create_task(self._fleet.keep_looking())
+        self._looks = asyncio.create_task(self._fleet.look_periodically())
 
     async def stop(self) -> None:
         """Closes the line."""

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from volery.core.errors import BridgeError
 
-_MOST_UNSENT_BYTES = 1 << 14
+_MAX_UNSENT_BYTES = 1 << 14
 """Largest number of unsent bytes; frames beyond are dropped, as PX4 does."""
 
 
@@ -46,7 +46,7 @@ class SerialLine:
 
     def send(self, data: bytes) -> None:
         """Sends frames; drops them if the line is too slow."""
-        if len(self._unsent) + len(data) <= _MOST_UNSENT_BYTES:
+        if len(self._unsent) + len(data) <= _MAX_UNSENT_BYTES:
             self._unsent += data
             self._write()
 

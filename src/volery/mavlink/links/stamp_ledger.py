@@ -110,9 +110,9 @@ class StampLedger:
 
         oldest: the smallest stamp of a stream that a vehicle does not know.
         """
-        least = max(oldest, self._since) - 1
+        floor = max(oldest, self._since) - 1
         with self._lock:
-            before = self._before.get(stream, least)
+            before = self._before.get(stream, floor)
             found = {
                 vehicle
                 for vehicle in vehicles

@@ -18,7 +18,7 @@ from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _UNSENT_BYTES = 1 << 18
 """Largest number of unsent bytes for a TCP client that does not read; later frames are dropped."""
-_MOST_CLIENTS = 32
+_MAX_CLIENTS = 32
 """Clients of the TCP server (modelling choice). Beyond, the oldest without a valid frame ends."""
 _BUFFER_BYTES = 2048
 """Bytes read at once, so that no client delays others or the simulation for long."""
@@ -65,7 +65,7 @@ class MavlinkTcp:
                 self.host,
                 self.port,
                 "MAVLink TCP",
-                max_connections=_MOST_CLIENTS,
+                max_connections=_MAX_CLIENTS,
                 max_unproven=None,  # a program may only receive
             )
             self._server = await loop.create_server(lambda: _TcpClient(self), sock=self._listener)
@@ -76,7 +76,7 @@ class MavlinkTcp:
         self.port = self._server.sockets[0].getsockname()[1]
         self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
         self._fleet.look()
-        self._looks = asyncio.create_task(self._fleet.keep_looking())
+        self._looks = asyncio.create_task(self._fleet.look_periodically())
 
     async def stop(self) -> None:
         """Ends all connections."""
@@ -170,7 +170,7 @@ class _TcpClient(asyncio.BufferedProtocol):
             self._bridge._end_foreign(self)
             return
         pause_s = self.connection.take(data)
-        if not self._proven and self.connection.has_spoken:
+        if not self._proven and self.connection.has_received:
             self._proven = True
             self._bridge._prove(self)
         if pause_s > 0.0 and not self.transport.is_closing():

@@ -22,9 +22,9 @@ from volery.mavlink.links.signing import signing_of
 from volery.mavlink.links.udp_reader import UdpReader, connected_socket
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
-_MOST_WITH_PEERS = 64
+_MAX_VEHICLES_WITH_PEERS = 64
 """Vehicles whose configured peers have their own sockets; peers of further vehicles share one."""
-_MOST_DATAGRAM = 1400
+_MAX_DATAGRAM_BYTES = 1400
 """Largest datagram, bytes: below the MTU of Ethernet."""
 
 
@@ -68,7 +68,7 @@ class MavlinkUdp:
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
         self._fleet = VehicleRegistry(gateway, self.name, self._join, self._leave)
         self._fleet.look()
-        self._looks = asyncio.create_task(self._fleet.keep_looking())
+        self._looks = asyncio.create_task(self._fleet.look_periodically())
 
     async def stop(self) -> None:
         """Closes all ports."""
@@ -100,7 +100,7 @@ class MavlinkUdp:
                         (self._host, to),
                         self._key,
                         self._intake,
-                        for_peer=len(self._links) < _MOST_WITH_PEERS,
+                        for_peer=len(self._links) < _MAX_VEHICLES_WITH_PEERS,
                     )
                 )
         except BridgeError as error:
@@ -153,8 +153,8 @@ class _UdpLink:
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise BridgeError(f"cannot listen on UDP port {own}: {why_not(error)}") from None
-        beside = connected_socket(self._socket, to) if for_peer else None
-        self._inlets = [self._read_from(sock) for sock in (self._socket, beside) if sock]
+        connected = connected_socket(self._socket, to) if for_peer else None
+        self._inlets = [self._read_from(sock) for sock in (self._socket, connected) if sock]
         fleet.send(system, own, profile, b"")
 
     def send(self, data: bytes) -> None:
@@ -182,11 +182,11 @@ class _UdpLink:
         self, data: bytes, peer: tuple[str, int], account: RateAccount
     ) -> tuple[bytes, float]:
         """Returns the frames of a datagram, and for how many seconds none must be read after it."""
-        heard = self._framer.datagram(data)
-        accepted = (frame for frame in heard if self._signing.accepts(frame, self._system))
+        received = self._framer.datagram(data)
+        accepted = (frame for frame in received if self._signing.accepts(frame, self._system))
         frames = b"".join(frame.data for frame in accepted)
-        noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
-        cost_s = account.charge(max(1, len(heard)), noise_bytes)
+        noise_bytes = len(data) - sum(len(frame.data) for frame in received)
+        cost_s = account.charge(max(1, len(received)), noise_bytes)
         pause_s = max(cost_s, self._fleet.pause_s)
         if self._signing.has_key and not frames:  # unknown sender
             return b"", pause_s
@@ -197,11 +197,11 @@ class _UdpLink:
 
 def _pieces(data: bytes) -> list[bytes]:
     """Splits frames into datagrams without cutting a frame."""
-    if len(data) <= _MOST_DATAGRAM:
+    if len(data) <= _MAX_DATAGRAM_BYTES:
         return [data]
     pieces, start, at = [], 0, 0
     for length in lengths_of(data):
-        if at + length - start > _MOST_DATAGRAM and at > start:
+        if at + length - start > _MAX_DATAGRAM_BYTES and at > start:
             pieces.append(data[start:at])
             start = at
         at += length

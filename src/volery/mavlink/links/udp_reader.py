@@ -17,7 +17,7 @@ from volery.mavlink.links.rate_limits import RateAccount
 
 _DATAGRAMS_A_TURN = 32
 """Datagrams after which other sockets have their turn."""
-_MOST_BYTES = 65535
+_MAX_BYTES = 65535
 _ERROR_PAUSE_S = 0.2
 """Pause after the system reported that a port has no receiver, which it does for each datagram."""
 
@@ -61,14 +61,14 @@ class UdpReader:
         frames, pause_s = [], 0.0
         for _ in range(_DATAGRAMS_A_TURN):
             try:
-                data, peer = self.socket.recvfrom(_MOST_BYTES)
+                data, peer = self.socket.recvfrom(_MAX_BYTES)
             except (BlockingIOError, InterruptedError):
                 break
             except OSError:
                 pause_s = _ERROR_PAUSE_S
             else:
-                taken, pause_s = self._take(data, peer, self._account)
-                frames.append(taken)
+                accepted, pause_s = self._take(data, peer, self._account)
+                frames.append(accepted)
             if pause_s > 0.0:
                 self._loop.remove_reader(self.socket)
                 self._read_after(pause_s)
@@ -93,18 +93,18 @@ def connected_socket(bound: socket.socket, peer: tuple[str, int]) -> socket.sock
 
     Both sockets share the port for a moment only; afterwards it is taken for all others, as before.
     """
-    beside = socket.socket(bound.family, socket.SOCK_DGRAM)
-    beside.setblocking(False)
+    connected = socket.socket(bound.family, socket.SOCK_DGRAM)
+    connected.setblocking(False)
     try:
-        for sock in (bound, beside):
+        for sock in (bound, connected):
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        beside.bind(bound.getsockname())
-        beside.connect(peer)
+        connected.bind(bound.getsockname())
+        connected.connect(peer)
     except OSError:
-        beside.close()
+        connected.close()
         return None
     finally:
-        for sock in (bound, beside):
+        for sock in (bound, connected):
             with contextlib.suppress(OSError):
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 0)
-    return beside
+    return connected

@@ -21,7 +21,7 @@ from volery.graph.subscription_queue import SubscriptionQueue
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"
 _DEPTH = 1000
-_MOST_WAITING = 2000
+_MAX_WAITING = 2000
 """Messages with frames that the simulation has not processed, above which clients wait."""
 _PAUSE_S = 0.02
 _LOOK_S = 0.2
@@ -75,7 +75,7 @@ class VehicleRegistry:
     @property
     def pause_s(self) -> float:
         """Time for which no client must be read, because the simulation has not kept up, s."""
-        return _PAUSE_S if self._session.waiting > _MOST_WAITING else 0.0
+        return _PAUSE_S if self._session.waiting > _MAX_WAITING else 0.0
 
     def look(self) -> None:
         """Finds vehicles that appeared or left, and repeats heartbeats of silent ones."""
@@ -96,7 +96,7 @@ class VehicleRegistry:
                 craft.received_s = now_s
                 craft.sink(-1, craft.heartbeat)
 
-    async def keep_looking(self) -> None:
+    async def look_periodically(self) -> None:
         """Calls `look` periodically."""
         while True:
             await asyncio.sleep(_LOOK_S)

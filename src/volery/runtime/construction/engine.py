@@ -10,7 +10,7 @@ from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.construction.assembly import Assembly, assemble
-from volery.runtime.construction.fleet import place
+from volery.runtime.construction.fleet import place_fleet
 from volery.runtime.construction.partition import WHOLE, Partition
 from volery.runtime.construction.placement import StartPose
 from volery.runtime.construction.worlds import BuiltWorld
@@ -33,7 +33,7 @@ def build_engine(
     scenario: Scenario, world: BuiltWorld, pacer: Pacer, partition: Partition = WHOLE
 ) -> ConnectedEngine:
     """Returns an engine whose runs `pacer` paces. Raises `ScenarioError`, `DataFileError`."""
-    starts = place(scenario, world.scene, world.terrain)
+    starts = place_fleet(scenario, world.scene, world.terrain)
     assembly = assemble(scenario, starts, world.scene, partition)
     commands = CommandQueue(on_post=pacer.wake)
     graph = Graph(lambda: engine.time_ns, commands.post)

@@ -132,7 +132,7 @@ class _Knowledge:
 def _mounting(aids: Mapping[str, SensorInstance]) -> Mounting:
     from volery.control.estimator.settings import Mounting
 
-    places: dict[str, Any] = {}
+    mounting: dict[str, Any] = {}
     for kind, key in (
         ("imu", "imu_position_body"),
         ("gnss", "gnss_position_body"),
@@ -140,11 +140,11 @@ def _mounting(aids: Mapping[str, SensorInstance]) -> Mounting:
         ("sonar", "range_position_body"),
     ):
         if kind in aids:
-            places[key] = tuple(aids[kind].mount.position_body.tolist())
+            mounting[key] = tuple(aids[kind].mount.position_body.tolist())
     for kind, key in (("imu", "imu_attitude_body"), ("magnetometer", "magnetometer_attitude_body")):
         if kind in aids:
-            places[key] = tuple(aids[kind].mount.attitude_body.tolist())
+            mounting[key] = tuple(aids[kind].mount.attitude_body.tolist())
     if "sonar" in aids:
         ahead = rotations.rotate(aids["sonar"].mount.attitude_body, [1.0, 0.0, 0.0])
-        places["range_axis_body"] = tuple(ahead.tolist())
-    return Mounting(**places)
+        mounting["range_axis_body"] = tuple(ahead.tolist())
+    return Mounting(**mounting)

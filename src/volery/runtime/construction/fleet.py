@@ -24,7 +24,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 
-def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[StartPose, ...]:
+def place_fleet(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[StartPose, ...]:
     """Returns the start pose of every UAV. Raises `ScenarioError` for invalid ones."""
     return place_uavs(scenario, airframes_of(scenario), scene, terrain)
 

@@ -30,10 +30,10 @@ class Geometry:
     @cached_property
     def id(self) -> str:
         """24 hexadecimal digits, equal for equal geometry on any machine at any time."""
-        taken = hashlib.blake2b(digest_size=12)
+        digest = hashlib.blake2b(digest_size=12)
         for part in self._parts():
-            taken.update(repr(part).encode() if not isinstance(part, np.ndarray) else part.data)
-        return taken.hexdigest()
+            digest.update(repr(part).encode() if not isinstance(part, np.ndarray) else part.data)
+        return digest.hexdigest()
 
     def _parts(self) -> Iterator[Any]:
         yield from _plain(self.terrain.grid)
@@ -65,11 +65,11 @@ class WorldTopic:
     def __init__(self, graph: Graph, geometry: Callable[[], Geometry]) -> None:
         self._publisher = graph.advertise("/volery/world", String, latched=True)
         self._geometry = geometry
-        self._told = ""
+        self._published_id = ""
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publishes the id if it has changed; call it in the simulation's thread."""
-        present = self._geometry().id
-        if present != self._told:
-            self._told = present
-            self._publisher.publish(String(data=present))
+        geometry_id = self._geometry().id
+        if geometry_id != self._published_id:
+            self._published_id = geometry_id
+            self._publisher.publish(String(data=geometry_id))

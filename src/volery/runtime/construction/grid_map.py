@@ -68,9 +68,9 @@ def blocks_of(grid: GridMap, terrain: Terrain) -> tuple[Solid, ...]:
     x0, y0, x1, y1 = terrain.bounds
     inside = x0 <= bounds[0] and y0 <= bounds[1] and bounds[2] <= x1 and bounds[3] <= y1
     if not inside:
-        reach = "({:g}, {:g}) to ({:g}, {:g})".format(*bounds)
+        extent = "({:g}, {:g}) to ({:g}, {:g})".format(*bounds)
         raise CommandError(
-            f"grid map '{grid.name}': its blocks extend from {reach} m, beyond the terrain, which "
+            f"grid map '{grid.name}': its blocks extend from {extent} m, beyond the terrain, which "
             f"extends from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
         )
     lowest, highest = _heights_below(bounds, terrain)

@@ -12,13 +12,13 @@ from volery.world.forest import Forest
 from volery.world.materials import Material
 from volery.world.scene import Hits, Scene
 
-_MOST_SURFACES = 192
+_MAX_SURFACES = 192
 """Max number of surfaces; behind more of them no signal is left, and they are not counted."""
 _PAST_LEAF_M, _PAST_SURFACE_M = 0.25, 0.02
 """Distances behind a leaf, and another surface, at which a ray continues."""
 _TRUNK_M = 2.0
 """Wood of one tree within this distance along the ray is one trunk. Modelling choice."""
-_NEAREST_M = 0.05
+_MIN_LENGTH_M = 0.05
 
 
 class LineOfSight:
@@ -35,7 +35,7 @@ class LineOfSight:
         if self._scene.solids is not self._solids:  # a grid map has changed
             self._twin, self._solids = self._scene.twin(), self._scene.solids
         rays = _Rays(starts, ends)
-        for _ in range(_MOST_SURFACES):
+        for _ in range(_MAX_SURFACES):
             if not len(rays.going):
                 break
             at, direction = rays.here()
@@ -54,14 +54,14 @@ class _Rays:
         self.paths = Paths.clear(count)
         self.length: Array = np.linalg.norm(ends - starts, axis=1)
         self._starts = starts
-        self._direction = (ends - starts) / np.maximum(self.length, _NEAREST_M)[:, None]
+        self._direction = (ends - starts) / np.maximum(self.length, _MIN_LENGTH_M)[:, None]
         self._at = np.zeros(count)
         """Distance travelled, m."""
         self._wood = np.full(count, -np.inf)
         """Distance of the last wood, m."""
         self._tree = np.full(count, -1)
         """Tree of the last wood."""
-        self.going = np.flatnonzero(self.length > _NEAREST_M)
+        self.going = np.flatnonzero(self.length > _MIN_LENGTH_M)
 
     def here(self) -> tuple[Array, Array]:
         """Returns the origins and directions, (K, 3) each, from which the active rays continue."""

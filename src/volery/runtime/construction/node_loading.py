@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
-from volery.graph.nodes.failures import add_frames, place_of
+from volery.graph.nodes.failures import add_frames, location_of
 from volery.graph.nodes.imports import advice_for_missing, provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
 from volery.graph.nodes.node import Context, Node
@@ -241,6 +241,6 @@ def _hint(found: Any) -> str:
 def _broken(what: str, error: Exception, advice: str = "") -> ScenarioError:
     """Returns an error of the node's code, with its line and the frames of the user's files."""
     kind = "" if isinstance(error, VoleryError) else f"{type(error).__name__}: "
-    failure = ScenarioError(f"{what}: {kind}{error}{place_of(error)}{advice}")
+    failure = ScenarioError(f"{what}: {kind}{error}{location_of(error)}{advice}")
     add_frames(failure, error)
     return failure

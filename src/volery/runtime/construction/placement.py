@@ -27,7 +27,7 @@ _TILT_SWEEPS = 4
 _GRIP_FRACTION = 0.9
 """Fraction of the feet's friction up to which a UAV rests on a slope."""
 _DROP_M = 0.3
-"""Height above the ground below which a landed UAV is put onto it, m."""
+"""Height above the ground below which a landed UAV is placed on it, m."""
 _PRESSED_M = 0.02
 """Max depth of the feet below the ground, more than after any landing, m."""
 _HINT = ' (placement = "nearest_free" finds a free position)'
@@ -66,28 +66,30 @@ def place_uavs(
         for k in range(group.count):
             name = f"uav{len(starts) + 1}"
             where = f"{scenario.name}: uavs[{g}] ({name})"
-            place = _nominal_place(group, k, airframe, terrain)
+            position = _nominal_position(group, k, airframe, terrain)
             slides = scenario.types[group.type].plant != "kinematic"
             if group.placement == "nearest_free":
-                place = _nearest_free(
-                    place, yaw, airframe, altitude, scene, terrain, starts, where, slides=slides
+                position = _nearest_free(
+                    position, yaw, airframe, altitude, scene, terrain, starts, where, slides=slides
                 )
             attitude, at_rest = yaw, False
-            feet = _standing(place[:2], airframe, terrain)[2]
-            if place[2] >= feet - _AT_REST_M and _is_on_terrain(place, terrain):
-                what = f"{where}: {_at(place)}"
-                place, attitude, at_rest = put_down(
-                    place, yaw, airframe, terrain, what, slides=slides, hint=_HINT
+            feet = _position_on_feet(position[:2], airframe, terrain)[2]
+            if position[2] >= feet - _AT_REST_M and _is_on_terrain(position, terrain):
+                what = f"{where}: {_at(position)}"
+                position, attitude, at_rest = landed_pose(
+                    position, yaw, airframe, terrain, what, slides=slides, hint=_HINT
                 )
-            check_place(place, airframe, scene, terrain, starts, where, hint=_HINT, at_rest=at_rest)
+            check_position(
+                position, airframe, scene, terrain, starts, where, hint=_HINT, at_rest=at_rest
+            )
             starts.append(
                 StartPose(
                     name,
                     group.type,
                     airframe,
-                    place,
+                    position,
                     attitude,
-                    on_ground=at_rest or stands_on_ground(place, airframe, terrain),
+                    on_ground=at_rest or stands_on_ground(position, airframe, terrain),
                     takes_off=group.on_start == "take_off",
                     at_rest=at_rest,
                 )
@@ -95,16 +97,16 @@ def place_uavs(
     return tuple(starts)
 
 
-def _nominal_place(group: UavGroup, k: int, airframe: Airframe, terrain: Terrain) -> Array:
+def _nominal_position(group: UavGroup, k: int, airframe: Airframe, terrain: Terrain) -> Array:
     xy = np.array(group.position_m[:2])
     if group.last_position_m is not None and group.count > 1:
         xy = xy + (np.array(group.last_position_m) - xy) * (k / (group.count - 1))
     if len(group.position_m) == 3:
         return np.array([xy[0], xy[1], group.position_m[2]])
-    return _standing(xy, airframe, terrain)
+    return _position_on_feet(xy, airframe, terrain)
 
 
-def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
+def _position_on_feet(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
     """Returns the body position (3,), m, with all feet at or above the ground."""
     z = max(
         float(terrain.height(xy[0] + foot[0], xy[1] + foot[1])) - foot[2]
@@ -113,13 +115,13 @@ def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
     return np.array([xy[0], xy[1], z])
 
 
-def _is_on_terrain(place: Array, terrain: Terrain) -> bool:
+def _is_on_terrain(position: Array, terrain: Terrain) -> bool:
     x0, y0, x1, y1 = terrain.bounds
-    return bool(x0 <= place[0] <= x1 and y0 <= place[1] <= y1)
+    return bool(x0 <= position[0] <= x1 and y0 <= position[1] <= y1)
 
 
-def _at(place: Array) -> str:
-    return f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
+def _at(position: Array) -> str:
+    return f"position_m ({position[0]:.2f}, {position[1]:.2f}, {position[2]:.2f})"
 
 
 def resting(
@@ -152,7 +154,7 @@ def resting(
 
 
 def _nearest_free(
-    place: Array,
+    position: Array,
     yaw: Array,
     airframe: Airframe,
     altitude: float,
@@ -171,8 +173,8 @@ def _nearest_free(
         around = max(1, int(2.0 * math.pi * radius / _SEARCH_STEP_M))
         for i in range(around):
             angle = 2.0 * math.pi * i / around
-            xy = place[:2] + radius * np.array([math.cos(angle), math.sin(angle)])
-            candidate = _standing(xy, airframe, terrain)
+            xy = position[:2] + radius * np.array([math.cos(angle), math.sin(angle)])
+            candidate = _position_on_feet(xy, airframe, terrain)
             column = candidate + np.linspace(0.0, altitude, _CLIMB_LOOKS)[:, None] * [0.0, 0.0, 1.0]
             room = scene.clearance(column, _ROOM_TO_STAND_M, include_terrain=False).distance
             apart = all(
@@ -185,24 +187,25 @@ def _nearest_free(
                 return candidate
     raise PlacementError(
         f"{where}: no free position within {_SEARCH_RADIUS_M:g} m of "
-        f"({place[0]:.1f}, {place[1]:.1f}) m with {_ROOM_TO_STAND_M} m of room; choose another one"
+        f"({position[0]:.1f}, {position[1]:.1f}) m with "
+        f"{_ROOM_TO_STAND_M} m of room; choose another one"
     )
 
 
-def stands_on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> bool:
-    """Returns whether a UAV at `place` (3,), m, stands, or is less than 0.3 m above standing."""
-    return bool(place[2] - _standing(place[:2], airframe, terrain)[2] < _DROP_M)
+def stands_on_ground(position: Array, airframe: Airframe, terrain: Terrain) -> bool:
+    """Returns whether a UAV at `position` (3,), m, stands, or is less than 0.3 m above standing."""
+    return bool(position[2] - _position_on_feet(position[:2], airframe, terrain)[2] < _DROP_M)
 
 
-def raised(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
-    """Returns `place` (3,), m, raised onto its feet if it lies between feet and ground."""
-    ground = float(terrain.height(place[0], place[1]))
-    standing = _standing(place[:2], airframe, terrain)
-    return standing if ground - _PRESSED_M <= place[2] < standing[2] else place
+def raised(position: Array, airframe: Airframe, terrain: Terrain) -> Array:
+    """Returns `position` (3,), m, raised onto its feet if it lies between feet and ground."""
+    ground = float(terrain.height(position[0], position[1]))
+    on_feet = _position_on_feet(position[:2], airframe, terrain)
+    return on_feet if ground - _PRESSED_M <= position[2] < on_feet[2] else position
 
 
-def put_down(
-    place: Array,
+def landed_pose(
+    position: Array,
     attitude: Array,
     airframe: Airframe,
     terrain: Terrain,
@@ -213,28 +216,29 @@ def put_down(
 ) -> tuple[Array, Array, bool]:
     """Returns position (3,), m, attitude (4,) and whether it rests, of a UAV that is landed.
 
-    It rests if `place` is between the ground and 0.3 m above its height at rest, and keeps its
+    It rests if `position` is between the ground and 0.3 m above its height at rest, and keeps its
     heading. slides: whether ground can be too steep for it; `PlacementError`, which begins with
     `what` and ends with `hint`, is raised there.
     """
-    place = raised(place, airframe, terrain)
-    depth = _standing(place[:2], airframe, terrain)[2] - place[2]
-    if depth > _AT_REST_M or not stands_on_ground(place, airframe, terrain):
-        return place, attitude, False
+    position = raised(position, airframe, terrain)
+    depth = _position_on_feet(position[:2], airframe, terrain)[2] - position[2]
+    if depth > _AT_REST_M or not stands_on_ground(position, airframe, terrain):
+        return position, attitude, False
     yaw = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(attitude))
-    rest = resting(place[:2], yaw, airframe, terrain)
+    rest = resting(position[:2], yaw, airframe, terrain)
     if rest is not None:
         return (*rest, True)
     if slides:
-        most = math.degrees(math.atan(_GRIP_FRACTION * airframe.ground.friction))
+        max_slope_deg = math.degrees(math.atan(_GRIP_FRACTION * airframe.ground.friction))
         raise PlacementError(
-            f"{what}: the ground is steeper than the {most:.0f} degrees on which it stands{hint}"
+            f"{what}: the ground is steeper than the {max_slope_deg:.0f} degrees on which it "
+            f"stands{hint}"
         )
-    return _standing(place[:2], airframe, terrain), yaw, False
+    return _position_on_feet(position[:2], airframe, terrain), yaw, False
 
 
-def check_place(
-    place: Array,
+def check_position(
+    position: Array,
     airframe: Airframe,
     scene: Scene,
     terrain: Terrain,
@@ -244,22 +248,22 @@ def check_place(
     hint: str = "",
     at_rest: bool = False,
 ) -> None:
-    """Raises `PlacementError` if a UAV cannot be at `place` (3,), m, map, among `others`.
+    """Raises `PlacementError` if a UAV cannot be at `position` (3,), m, map, among `others`.
 
-    `where` begins the message; `hint` ends it with a remedy. at_rest: the place is one of
+    `where` begins the message; `hint` ends it with a remedy. at_rest: the position is one of
     `resting`, where a tilted UAV may be lower than a level one.
     """
-    at = _at(place)
-    if not _is_on_terrain(place, terrain):
+    at = _at(position)
+    if not _is_on_terrain(position, terrain):
         x0, y0, x1, y1 = terrain.bounds
         raise PlacementError(
             f"{where}: {at} is beyond the terrain, which extends from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"
         )
-    check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint, at_rest=at_rest)
+    check_room(position, airframe, scene, terrain, f"{where}: {at}", hint=hint, at_rest=at_rest)
     radius = airframe.body.collision_radius_m
     for other in others:
-        distance = float(np.linalg.norm(place - other.position_map))
+        distance = float(np.linalg.norm(position - other.position_map))
         needed = radius + other.airframe.body.collision_radius_m
         if distance < needed:
             raise PlacementError(
@@ -269,7 +273,7 @@ def check_place(
 
 
 def check_room(
-    place: Array,
+    position: Array,
     airframe: Airframe,
     scene: Scene,
     terrain: Terrain,
@@ -280,19 +284,19 @@ def check_room(
 ) -> None:
     """Raises `PlacementError` if a position (3,), m, map, is below the ground or in an obstacle.
 
-    `what` begins the message; `hint` ends it with a remedy. at_rest: as in `check_place`.
+    `what` begins the message; `hint` ends it with a remedy. at_rest: as in `check_position`.
     """
-    standing = float(_standing(place[:2], airframe, terrain)[2])
-    if place[2] < standing - _TOLERANCE_M and not at_rest:
+    min_z = float(_position_on_feet(position[:2], airframe, terrain)[2])
+    if position[2] < min_z - _TOLERANCE_M and not at_rest:
         raise PlacementError(
-            f"{what} lies {standing - place[2]:.2f} m under the ground or with its feet in "
-            f"it; z must be at least {standing:.2f} there"
+            f"{what} lies {min_z - position[2]:.2f} m under the ground or with its feet in "
+            f"it; z must be at least {min_z:.2f} there"
         )
-    around = int(scene.enclosing(place[None])[0])
+    around = int(scene.enclosing(position[None])[0])
     if around >= 0:
         raise PlacementError(f"{what} lies inside {scene.instance_name(around)}{hint}")
     radius = airframe.body.collision_radius_m
-    look = scene.clearance(place[None], radius, include_terrain=False)
+    look = scene.clearance(position[None], radius, include_terrain=False)
     if look.instance[0] >= 0:
         raise PlacementError(
             f"{what} lies in {scene.instance_name(int(look.instance[0]))}, "

@@ -53,7 +53,7 @@ RESULT_OF: dict[str, type[Samples]] = {
 """Samples of each kind of sensor."""
 
 
-PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
+IMAGE_KEYS = ("width", "height", "horizontal_fov_deg", "samples")
 """Keys of a camera's model that a scenario may override."""
 
 
@@ -76,8 +76,8 @@ class SensorInstance:
         spec = self.spec
         rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
         noise, intensities = getattr(spec, "noise", None), getattr(spec, "intensities", None)
-        picture = [getattr(spec, name, None) for name in PICTURE]
-        return (spec.kind, model, rate, spec.phase_s, noise, intensities, *picture)
+        image = [getattr(spec, name, None) for name in IMAGE_KEYS]
+        return (spec.kind, model, rate, spec.phase_s, noise, intensities, *image)
 
     @property
     def topic(self) -> str:
@@ -176,11 +176,11 @@ class _LidarModels:
 
 def _check_topics(scenario: schema.Scenario, fitted: Sequence[SensorInstance]) -> None:
     """Raises `ScenarioError` if two LIDARs of a UAV publish on one topic."""
-    taken: dict[str, str] = {}
+    names_by_topic: dict[str, str] = {}
     for sensor in fitted:
         if sensor.lidar is None:
             continue
-        other = taken.setdefault(sensor.topic, sensor.id.name)
+        other = names_by_topic.setdefault(sensor.topic, sensor.id.name)
         if other != sensor.id.name:
             raise ScenarioError(
                 f"{scenario.name}: sensors '{other}' and '{sensor.id.name}' both publish on "

@@ -14,7 +14,7 @@ from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.construction.geo_reference import denial, local_frame, magnetic_field_map
 from volery.runtime.construction.partition import DIVIDED_SENSORS, WHOLE, Partition
-from volery.runtime.construction.sensor_suites import PICTURE, RESULT_OF, SensorInstance
+from volery.runtime.construction.sensor_suites import IMAGE_KEYS, RESULT_OF, SensorInstance
 from volery.runtime.construction.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank, SensorGroup
@@ -124,7 +124,7 @@ class _Builder:
         from volery.sensors.cameras.model import CameraModel
 
         spec = one.spec
-        own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
+        own = {name: getattr(spec, name) for name in IMAGE_KEYS if getattr(spec, name) is not None}
         model = CameraModel.load(self._model(one)).model_copy(update=own)
         return CameraBank(model, group, self._scene, light_of(self._world))
 

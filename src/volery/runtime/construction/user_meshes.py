@@ -14,11 +14,11 @@ from volery.scenario.schema import Scenario
 from volery.scenario.user_mesh import UserMesh
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
-from volery.world.mesh_files import FARTHEST_M, MeshFile, read_mesh
+from volery.world.mesh_files import MAX_DISTANCE_M, MeshFile, read_mesh
 from volery.world.scene import Look, Solid
 
 _log = logging.getLogger(__name__)
-_SMALLEST_M, _TALLEST_M = 0.02, 1000.0
+_MIN_SIZE_M, _MAX_HEIGHT_M = 0.02, 1000.0
 """Sizes beyond which a mesh probably is in other units: the tallest building has 828 m."""
 
 
@@ -43,7 +43,7 @@ def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
 def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
     mesh = file.placed(_placing(entry))
     _check_distance(entry, path, mesh)
-    _question_size(path, mesh)
+    _check_size(path, mesh)
     colour = entry.colour or file.colour
     material, name = Material[entry.material.upper()], entry.name or path.stem
     return Solid(mesh, material, name, look=Look(colour), is_shell=not mesh.is_closed)
@@ -59,24 +59,24 @@ def _placing(entry: UserMesh) -> NDArray[np.float64]:
 def _check_distance(entry: UserMesh, path: Path, mesh: Mesh) -> None:
     """Raises `DataFileError` for a mesh far away, with the position of one only shifted."""
     far = float(np.abs(mesh.vertices).max())
-    if far <= FARTHEST_M:
+    if far <= MAX_DISTANCE_M:
         return
     low, high = mesh.bounds
     advice = "is `scale` right?"
-    if float((high - low).max()) <= FARTHEST_M:
+    if float((high - low).max()) <= MAX_DISTANCE_M:
         middle = np.round(np.array(entry.position_m) - (low + high) / 2.0)
         there = ", ".join(f"{value:.0f}" for value in middle.tolist())
         advice += f" If its coordinates are projected ones: position_m = [{there}]"
     raise DataFileError(
-        f"{path} extends to {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
+        f"{path} extends to {far:.3g} m from the map's origin, at most {MAX_DISTANCE_M:g} m is "
         f"allowed; {advice}"
     )
 
 
-def _question_size(path: Path, mesh: Mesh) -> None:
+def _check_size(path: Path, mesh: Mesh) -> None:
     size = np.subtract(*mesh.bounds[::-1])
     shown = " x ".join(f"{value:.3g}" for value in size.tolist())
-    if size[2] > _TALLEST_M:
+    if size[2] > _MAX_HEIGHT_M:
         _log.warning("%s is %s m: if the file is in mm, set scale = 0.001", path.name, shown)
-    elif size.max() < _SMALLEST_M:
+    elif size.max() < _MIN_SIZE_M:
         _log.warning("%s is %s m: is `scale` right?", path.name, shown)

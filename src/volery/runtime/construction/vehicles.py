@@ -53,13 +53,13 @@ def _build_radio(
     if radio is None:
         return None
 
-    def places() -> Mapping[int, Array]:
+    def positions() -> Mapping[int, Array]:
         position = engine.fleet.state.position_map
         rows = {name: row for row, name in enumerate(engine.names)}
         return {address: position[rows[name]] for name, address in net.addresses().items()}
 
     link = None
     if radio.links == "modelled":
-        link = RadioChannel(radio, scenario.seed, places, LineOfSight(engine.scene, forest))
+        link = RadioChannel(radio, scenario.seed, positions, LineOfSight(engine.scene, forest))
     net = RadioNetwork(graph, engine, radio.topics, link)
     return net

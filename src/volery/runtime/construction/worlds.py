@@ -52,8 +52,8 @@ def build_terrain(scenario: Scenario) -> Terrain:
             return Terrain.from_csv(path, terrain.spacing_m, origin=terrain.origin_m)
         except DataFileError as error:
             raise DataFileError(f"{scenario.name}: world.terrain: {error}") from None
-    reach = terrain.extent_m
-    return Terrain.flat(2.0 * reach, terrain.height_m, origin=(-reach, -reach))
+    extent_m = terrain.extent_m
+    return Terrain.flat(2.0 * extent_m, terrain.height_m, origin=(-extent_m, -extent_m))
 
 
 def build_city(scenario: Scenario, terrain: Terrain) -> City | None:

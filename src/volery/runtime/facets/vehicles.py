@@ -130,7 +130,7 @@ class SimulationVehicles(BatchCommands):
         `PlacementError` for an impossible pose.
         """
         self._check_open()
-        self._teleporter.place(self.row_of(name), position_map, attitude)
+        self._teleporter.teleport(self.row_of(name), position_map, attitude)
 
     def set_velocity(self, name: str, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
         """Sets a UAV's velocity, (3,) m/s, and angular velocity, (3,) rad/s, both in the map.
@@ -168,9 +168,9 @@ class SimulationVehicles(BatchCommands):
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [self._manager.futures]
 
-    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
+    def _check_accepted(self, command: str, ignoring: Collection[FlightMode]) -> None:
         fleet = self._manager.engine.fleet
-        if not np.isin(fleet.modes, list(deaf)).all():
+        if not np.isin(fleet.modes, list(ignoring)).all():
             return
         modes = ", ".join(
             f"{name} is {fleet.mode(i).name}" for i, name in enumerate(self.names[:3])

@@ -60,7 +60,7 @@ class SimulationWorld:
         self._engine = engine
         self._check_open = check_open
         self._topics = WeatherTopics(graph, settings, lambda: self.weather, self.set_weather)
-        self._topics.tell(self.weather)
+        self._topics.publish(self.weather)
 
     def __repr__(self) -> str:
         parts = []
@@ -85,7 +85,7 @@ class SimulationWorld:
     def set_weather(self, weather: Weather) -> None:
         """Changes the weather, from the next guidance tick and the next measurement on."""
         self._engine.set_weather(weather)
-        self._topics.tell(weather)
+        self._topics.publish(weather)
 
     def gust_now(
         self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
@@ -93,7 +93,7 @@ class SimulationWorld:
         """Starts a 1-cosine gust of `amplitude_map` (3,) m/s that ends after `lasts_s`."""
         self._check_open()
         self._engine.gust_now(amplitude_map, rise_s, lasts_s)
-        self._topics.tell(self.weather)
+        self._topics.publish(self.weather)
 
     @property
     def actors(self) -> MovingActors | None:

@@ -13,7 +13,7 @@ from volery.runtime.monitoring.live_topic import LiveTopic
 TOPIC = "/volery/faults"
 _TYPE = "std_msgs/msg/String"
 _PERIOD_S = 1.0
-_LEAST_S = 0.1
+_MIN_PERIOD_S = 0.1
 
 
 def faults_topic(graph: Graph, plan: FaultPlan) -> LiveTopic:
@@ -23,9 +23,9 @@ def faults_topic(graph: Graph, plan: FaultPlan) -> LiveTopic:
     """
 
     def message() -> Any:
-        told = [fault.model_dump(mode="json", exclude_none=True) for fault in plan.active]
-        return message_type(_TYPE)(json.dumps(told))
+        active = [fault.model_dump(mode="json", exclude_none=True) for fault in plan.active]
+        return message_type(_TYPE)(json.dumps(active))
 
     return LiveTopic(
-        graph.advertise(TOPIC, _TYPE), message, lambda: plan.active, _PERIOD_S, _LEAST_S
+        graph.advertise(TOPIC, _TYPE), message, lambda: plan.active, _PERIOD_S, _MIN_PERIOD_S
     )

@@ -17,7 +17,7 @@ from volery.runtime.monitoring.live_topic import LiveTopic
 
 TOPIC = "/ground_truth/tf"
 _PERIOD_S = 0.02
-_LEAST_S = 0.05
+_MIN_PERIOD_S = 0.05
 """Min wall time between two external messages, s: smooth at a twentieth of real time."""
 
 
@@ -25,7 +25,7 @@ def ground_truth_topic(graph: Graph, engine: Engine) -> LiveTopic:
     """Publishes `map -> uavN/base_link` of every UAV in order, then `map -> NAME` of actors."""
     publisher = graph.advertise(TOPIC, TFMessage)
     return LiveTopic(
-        publisher, lambda: _message(engine), lambda: _content(engine), _PERIOD_S, _LEAST_S
+        publisher, lambda: _message(engine), lambda: _content(engine), _PERIOD_S, _MIN_PERIOD_S
     )
 
 

@@ -22,17 +22,17 @@ class LiveTopic:
     """Publishes `message()` each `period_s` of simulated time, and in between on changes.
 
     `content()` is cheap and differs from the last one if the message would. External clients
-    receive changes after at least `least_s` of wall time without a message.
+    receive changes after at least `min_period_s` of wall time without a message.
     """
 
     publisher: Publisher
     message: Callable[[], Any]
     content: Callable[[], Any]
     period_s: float
-    least_s: float
+    min_period_s: float
     _last_content: Any = None
     _published_at_s: float = 0.0
-    _watchers: int = 0
+    _num_subscribers: int = 0
     _now_s: float = 0.0
 
     def begin(self, every: Timers) -> None:
@@ -44,16 +44,23 @@ class LiveTopic:
         self._now_s = now_s
         if not self.publisher.has_external_subscribers:
             return
-        watchers = self.publisher.num_external_subscriptions
-        if watchers == self._watchers and now_s - self._published_at_s < self.least_s:
+        num_subscribers = self.publisher.num_external_subscriptions
+        if (
+            num_subscribers == self._num_subscribers
+            and now_s - self._published_at_s < self.min_period_s
+        ):
             return
         content = self.content()
-        if watchers != self._watchers or content != self._last_content:
-            self._watchers, self._last_content, self._published_at_s = watchers, content, now_s
+        if num_subscribers != self._num_subscribers or content != self._last_content:
+            self._num_subscribers, self._last_content, self._published_at_s = (
+                num_subscribers,
+                content,
+                now_s,
+            )
             self.publisher.publish_external(self.message())
 
     def _publish(self) -> None:
-        self._published_at_s, self._watchers = (
+        self._published_at_s, self._num_subscribers = (
             self._now_s,
             self.publisher.num_external_subscriptions,
         )

@@ -28,7 +28,7 @@ class Monitor:
     ) -> None:
         self._graph = gateway.graph
         engine, publisher, outlet = manager.engine, manager.publisher, manager.outlet
-        vehicles = VehicleTopic(engine, manager.uavs, gateway, operators.holder_of)
+        vehicles = VehicleTopic(engine, manager.uavs, gateway, operators.operator_of)
         self._present = (
             ground_truth_topic(gateway.graph, engine),
             vehicles.present,

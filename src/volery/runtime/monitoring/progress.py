@@ -41,19 +41,19 @@ class ProgressPublisher:
         self._on_progress = on_progress
         self._duration_s = duration_s
         self._pacer = pacer
-        self._begun = self._told = time.perf_counter()
+        self._begun = self._last_report = time.perf_counter()
         self._paused_before_s = pacer.paused_s
         self._last_s = self._before_s = 0.0
 
-    def tell(self, time_s: float, *, last: bool = False) -> None:
+    def report(self, time_s: float, *, last: bool = False) -> None:
         """Reports that the run has reached `time_s`; the `last` time in any case."""
         if time_s < self._last_s:  # a reset or restore
             self._before_s += self._last_s
         self._last_s = time_s
         now = time.perf_counter()
-        if self._on_progress is None or (now - self._told < _PERIOD_S and not last):
+        if self._on_progress is None or (now - self._last_report < _PERIOD_S and not last):
             return
-        self._told = now
+        self._last_report = now
         wall_s = now - self._begun - (self._pacer.paused_s - self._paused_before_s)
         self._on_progress(
             Progress(time_s, self._duration_s, wall_s, self._pacer.paused, self._before_s)

@@ -21,10 +21,10 @@ from volery.runtime.monitoring.live_topic import LiveTopic
 from volery.runtime.vehicles.uav import Uav
 
 TOPIC = "/volery/vehicles"
-_ONE = "volery_interfaces/msg/VehicleState"
+_STATE = "volery_interfaces/msg/VehicleState"
 _ALL = "volery_interfaces/msg/VehicleStates"
 _PERIOD_S = 0.2
-_LEAST_S = 0.2
+_MIN_PERIOD_S = 0.2
 _MODES = tuple(FlightMode(k).name for k in range(len(FlightMode)))
 NEVER_S = -1.0
 
@@ -43,7 +43,7 @@ class _Build:
 class VehicleTopic:
     """Publishes all UAVs of an engine.
 
-    `uavs` are their handles, `gateway` knows their clients, `holder` returns a UAV's operator.
+    `uavs` are their handles, `gateway` knows their clients, `operator_of` returns a UAV's operator.
     """
 
     def __init__(
@@ -51,15 +51,15 @@ class VehicleTopic:
         engine: Engine,
         uavs: Mapping[str, Uav],
         gateway: Gateway,
-        holder: Callable[[str], str],
+        operator_of: Callable[[str], str],
     ) -> None:
         self._engine = engine
         self._uavs = uavs
         self._gateway = gateway
         self._build = _build_of(engine.fleet)
-        self._holder = holder
+        self._operator_of = operator_of
         publisher = gateway.graph.advertise(TOPIC, _ALL)
-        self.present = LiveTopic(publisher, self.message, self.content, _PERIOD_S, _LEAST_S)
+        self.present = LiveTopic(publisher, self.message, self.content, _PERIOD_S, _MIN_PERIOD_S)
 
     def message(self) -> Any:
         """Returns the present state of all UAVs as a VehicleStates."""
@@ -81,7 +81,7 @@ class VehicleTopic:
             np.hstack([state.position_map, state.velocity_map]),
             rotors.astype(np.float32).tolist(),
             [self._command_age_s(name) for name in self._engine.names],
-            [self._holder(name) for name in self._engine.names],
+            [self._operator_of(name) for name in self._engine.names],
         )
         vehicles = LazyList(len(build.airframes), lambda: _vehicles(*columns))
         return message_type(_ALL)(header(self._engine.time_ns, "map"), vehicles)
@@ -98,7 +98,7 @@ class VehicleTopic:
             state.velocity_map.tobytes(),
             state.battery_charge.tobytes(),
             self._gateway.commands,
-            tuple(self._holder(name) for name in engine.names),
+            tuple(self._operator_of(name) for name in engine.names),
         )
 
     def _command_age_s(self, name: str) -> float:
@@ -115,10 +115,10 @@ class VehicleTopic:
 
 def _vehicles(*columns: Any) -> Iterator[Any]:
     """Yields one VehicleState per row; columns are its fields, position and velocity in one."""
-    one = message_type(_ONE)
-    for *head, motion, rotors, age_s, holder in zip(*columns, strict=True):
+    state_type = message_type(_STATE)
+    for *head, motion, rotors, age_s, operator in zip(*columns, strict=True):
         x, y, z, *velocity = motion.tolist()
-        yield one(*head, Point(x, y, z), Vector3(*velocity), rotors, age_s, holder)
+        yield state_type(*head, Point(x, y, z), Vector3(*velocity), rotors, age_s, operator)
 
 
 def _build_of(fleet: Fleet) -> _Build:

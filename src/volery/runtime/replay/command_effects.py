@@ -46,30 +46,32 @@ _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 class CommandEffect(Enum):
     """Classifies the effect of a command on the flight."""
 
-    ASKS = "nothing: a query"
+    QUERIES = "nothing: a query"
     PACES = "the pace, files, end or audience of the run, but no result"
     CHANGES = "the results"
 
 
-def restarts(taken: ClientCommand) -> bool:
+def restarts(command: ClientCommand) -> bool:
     """Returns whether a command has an effect after the end of a scenario."""
-    if taken.kind == "call" and (taken.type in _AT_THE_END or taken.name in _AT_THE_END_BY_NAME):
+    if command.kind == "call" and (
+        command.type in _AT_THE_END or command.name in _AT_THE_END_BY_NAME
+    ):
         return True
-    return weight_of(taken) is not CommandEffect.CHANGES
+    return weight_of(command) is not CommandEffect.CHANGES
 
 
-def weight_of(taken: ClientCommand) -> CommandEffect:
+def weight_of(command: ClientCommand) -> CommandEffect:
     """Returns the effect of a command; unknown services count as changing the results."""
-    if taken.kind in ("publish", "answer", "failure"):
+    if command.kind in ("publish", "answer", "failure"):
         return CommandEffect.CHANGES
-    if taken.kind != "call":
+    if command.kind != "call":
         return CommandEffect.PACES
-    package, _, name = taken.type.partition("/srv/")
+    package, _, name = command.type.partition("/srv/")
     if name.startswith(_ASKING.get(package, ())):
-        return CommandEffect.ASKS
-    if package == "rosapi_msgs" and taken.type not in _SETS_PARAMETERS:
-        return CommandEffect.ASKS
-    if taken.type == _SET_STATE:
-        state = _STOPPED if taken.content is None else int(taken.content.state.state)
+        return CommandEffect.QUERIES
+    if package == "rosapi_msgs" and command.type not in _SETS_PARAMETERS:
+        return CommandEffect.QUERIES
+    if command.type == _SET_STATE:
+        state = _STOPPED if command.content is None else int(command.content.state.state)
         return CommandEffect.CHANGES if state == _STOPPED else CommandEffect.PACES
-    return CommandEffect.PACES if taken.type in _PACE else CommandEffect.CHANGES
+    return CommandEffect.PACES if command.type in _PACE else CommandEffect.CHANGES

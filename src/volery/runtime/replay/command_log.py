@@ -20,7 +20,7 @@ from volery.graph.session import ClientCommand
 from volery.graph.subscription_queue import array_bytes
 from volery.runtime.replay.command_effects import CommandEffect, weight_of
 
-MOST_KEPT_BYTES = 32 * 1024 * 1024
+MAX_STORED_BYTES = 32 * 1024 * 1024
 """Max size of the stored commands (modelling choice), bytes; beyond it all are discarded."""
 _OVERHEAD_BYTES = 400
 """Memory of a stored command besides its content, bytes."""
@@ -30,7 +30,7 @@ class _StoredCommand(NamedTuple):
     number: int
     time_ns: int
     moment: CommandTime
-    taken: ClientCommand
+    command: ClientCommand
     """The command, without its content if `cdr` holds that."""
     cdr: bytes | None
 
@@ -49,38 +49,38 @@ class CommandLog:
         self._refuse = refuse or _accept
         self._publisher = graph.advertise(records.TOPIC, records.TYPE)
         self._publisher.lasting = True
-        self._kept: list[_StoredCommand] = []
-        self._kept_bytes = 0
-        self._has_lost_some = False
+        self._stored: list[_StoredCommand] = []
+        self._stored_bytes = 0
+        self._has_overflowed = False
         self._next_number = 0
         self._ended = False
         self.has_changes = False
         """Whether a command has changed the results of the flight."""
-        self.on_noted: Callable[[ClientCommand], None] = lambda _taken: None
+        self.on_noted: Callable[[ClientCommand], None] = lambda _command: None
         """Receives each recorded command that is about to take effect."""
         self.repeats = False
         """Whether a replay is running: clients may observe, and change nothing."""
 
-    def watch(self, taken: ClientCommand) -> None:
+    def watch(self, command: ClientCommand) -> None:
         """Records a command. Raises `GraphError` if it is refused."""
-        weight = weight_of(taken)
+        weight = weight_of(command)
         if self.repeats and weight is CommandEffect.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
-        if reason := self._refuse(taken):
+        if reason := self._refuse(command):
             raise GraphError(reason)
-        if weight is not CommandEffect.ASKS:
-            self.note(taken, weight)
+        if weight is not CommandEffect.QUERIES:
+            self.note(command, weight)
 
-    def note(self, taken: ClientCommand, weight: CommandEffect) -> None:
+    def note(self, command: ClientCommand, weight: CommandEffect) -> None:
         """Publishes and stores a command that is about to take effect."""
-        cdr = None if records.is_large(taken) else records.content_bytes(taken)
-        self.on_noted(taken)
+        cdr = None if records.is_large(command) else records.content_bytes(command)
+        self.on_noted(command)
         moment = self._engine.moment
-        kept = _StoredCommand(self._next_number, self._engine.time_ns, moment, taken, cdr)
+        stored = _StoredCommand(self._next_number, self._engine.time_ns, moment, command, cdr)
         self._next_number += 1
         if self._publisher.has_subscribers:
-            self._publisher.publish(_message(kept))
-        self._keep(kept)
+            self._publisher.publish(_message(stored))
+        self._store(stored)
         if weight is CommandEffect.CHANGES:
             self.has_changes = True
             self._engine.count_command()
@@ -98,50 +98,50 @@ class CommandLog:
         If they exceeded the memory limit, it yields the last one alone, without its content: its
         number shows that others are missing.
         """
-        for kept in self._kept:
-            yield Published(records.TOPIC, records.TYPE, self._engine.time_ns, _whole(kept))
+        for stored in self._stored:
+            yield Published(records.TOPIC, records.TYPE, self._engine.time_ns, _whole(stored))
 
-    def _keep(self, kept: _StoredCommand) -> None:
-        if self._has_lost_some:
-            self._kept = [_bare(kept)]
+    def _store(self, stored: _StoredCommand) -> None:
+        if self._has_overflowed:
+            self._stored = [_bare(stored)]
             return
-        if kept.cdr is None:
-            size = array_bytes(kept.taken.content)
+        if stored.cdr is None:
+            size = array_bytes(stored.command.content)
         else:
-            size = len(kept.cdr)
-            kept = kept._replace(taken=kept.taken._replace(content=None))
-        self._kept_bytes += size + _OVERHEAD_BYTES
-        if self._kept and self._kept_bytes > MOST_KEPT_BYTES:
-            self._has_lost_some = True
-            self._kept = [_bare(kept)]
+            size = len(stored.cdr)
+            stored = stored._replace(command=stored.command._replace(content=None))
+        self._stored_bytes += size + _OVERHEAD_BYTES
+        if self._stored and self._stored_bytes > MAX_STORED_BYTES:
+            self._has_overflowed = True
+            self._stored = [_bare(stored)]
         else:
-            self._kept.append(kept)
+            self._stored.append(stored)
 
 
-def _accept(_taken: ClientCommand) -> str:
+def _accept(_command: ClientCommand) -> str:
     """Refuses nothing."""
     return ""
 
 
-def _bare(kept: _StoredCommand) -> _StoredCommand:
+def _bare(stored: _StoredCommand) -> _StoredCommand:
     """Returns a command without its content."""
-    return kept._replace(taken=kept.taken._replace(content=None), cdr=b"")
+    return stored._replace(command=stored.command._replace(content=None), cdr=b"")
 
 
-def _whole(kept: _StoredCommand) -> object:
+def _whole(stored: _StoredCommand) -> object:
     """Returns the message of a stored command with its content."""
-    if kept.cdr is None:
-        return _message(kept._replace(cdr=records.content_bytes(kept.taken)))
-    content = records.content_of(kept.taken.kind, kept.taken.type, kept.cdr)
-    return _message(kept._replace(taken=kept.taken._replace(content=content)))
+    if stored.cdr is None:
+        return _message(stored._replace(cdr=records.content_bytes(stored.command)))
+    content = records.content_of(stored.command.kind, stored.command.type, stored.cdr)
+    return _message(stored._replace(command=stored.command._replace(content=content)))
 
 
-def _message(kept: _StoredCommand) -> object:
+def _message(stored: _StoredCommand) -> object:
     return records.record_of(
-        kept.taken,
-        kept.cdr,
-        number=kept.number,
-        time_ns=kept.time_ns,
-        step=kept.moment.step,
-        turn=kept.moment.turn,
+        stored.command,
+        stored.cdr,
+        number=stored.number,
+        time_ns=stored.time_ns,
+        step=stored.moment.step,
+        turn=stored.moment.turn,
     )

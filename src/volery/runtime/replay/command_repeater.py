@@ -31,27 +31,29 @@ class CommandRepeater:
         self._clients = _Clients(graph)
         self._stopped = False
 
-    def repeat(self, taken: ClientCommand) -> None:
+    def repeat(self, command: ClientCommand) -> None:
         """Repeats a command; one that failed the first time fails again."""
-        if self._is_left_out(taken):
+        if self._is_left_out(command):
             return
-        self._log.note(taken, weight_of(taken))
+        self._log.note(command, weight_of(command))
         paused = self._pacer.paused
-        with suppress(Exception), self._graph.on_behalf_of(taken.client):
-            self._clients.do(taken)
+        with suppress(Exception), self._graph.on_behalf_of(command.client):
+            self._clients.do(command)
         if self._pacer.paused and not paused:
             self._pacer.resume()
 
-    def _is_left_out(self, taken: ClientCommand) -> bool:
+    def _is_left_out(self, command: ClientCommand) -> bool:
         """Returns whether a command changed only the pace, or was refused because of it."""
-        if taken.kind == "call" and taken.type == _SET_STATE:
-            state = RunState.STOPPED if taken.content is None else taken.content.state.state
+        if command.kind == "call" and command.type == _SET_STATE:
+            state = RunState.STOPPED if command.content is None else command.content.state.state
             again = self._stopped and self._engine.time_ns == 0
             self._stopped = state == RunState.STOPPED or (
                 self._stopped and state != RunState.PLAYING
             )
             return again or state != RunState.STOPPED
-        return taken.kind in ("call", "goal", "cancel") and weight_of(taken) is CommandEffect.PACES
+        return (
+            command.kind in ("call", "goal", "cancel") and weight_of(command) is CommandEffect.PACES
+        )
 
 
 class _Clients:
@@ -68,50 +70,52 @@ class _Clients:
             "unadvertise": self._unadvertise,
             "offer": self._offer,
             "withdraw": self._withdraw,
-            "answer": lambda taken: self._request(taken).answer(taken.content),
-            "failure": lambda taken: self._request(taken).fail(GraphError(taken.content or "")),
+            "answer": lambda command: self._request(command).answer(command.content),
+            "failure": lambda command: self._request(command).fail(
+                GraphError(command.content or "")
+            ),
         }
 
-    def do(self, taken: ClientCommand) -> None:
+    def do(self, command: ClientCommand) -> None:
         """Repeats one command; raises whatever a service that it calls raises."""
-        self._deeds[taken.kind](taken)
+        self._deeds[command.kind](command)
 
-    def _call(self, taken: ClientCommand) -> None:
+    def _call(self, command: ClientCommand) -> None:
         self._graph.call_async(
-            taken.name, taken.content, ServiceReply(_has_no_subscribers, _has_no_subscribers)
+            command.name, command.content, ServiceReply(_has_no_subscribers, _has_no_subscribers)
         )
 
-    def _publish(self, taken: ClientCommand) -> None:
-        key = taken.client, taken.name
+    def _publish(self, command: ClientCommand) -> None:
+        key = command.client, command.name
         if key not in self._publishers:
-            self._advertise(taken)
-        if taken.content is not None:
-            self._publishers[key].publish(taken.content)
+            self._advertise(command)
+        if command.content is not None:
+            self._publishers[key].publish(command.content)
 
-    def _advertise(self, taken: ClientCommand) -> None:
-        self._unadvertise(taken)
-        self._publishers[taken.client, taken.name] = self._graph.advertise(
-            taken.name, taken.type, latched=taken.latched
+    def _advertise(self, command: ClientCommand) -> None:
+        self._unadvertise(command)
+        self._publishers[command.client, command.name] = self._graph.advertise(
+            command.name, command.type, latched=command.latched
         )
 
-    def _unadvertise(self, taken: ClientCommand) -> None:
-        publisher = self._publishers.pop((taken.client, taken.name), None)
+    def _unadvertise(self, command: ClientCommand) -> None:
+        publisher = self._publishers.pop((command.client, command.name), None)
         if publisher is not None:
             publisher.cancel()
 
-    def _offer(self, taken: ClientCommand) -> None:
-        requests = self._requests[taken.name] = []
+    def _offer(self, command: ClientCommand) -> None:
+        requests = self._requests[command.name] = []
 
-        def ask(_request: Any, reply: ServiceReply) -> None:
+        def receive(_request: Any, reply: ServiceReply) -> None:
             requests.append(reply)
 
-        self._graph.create_async_service(taken.name, taken.type, ask)
+        self._graph.create_async_service(command.name, command.type, receive)
 
-    def _withdraw(self, taken: ClientCommand) -> None:
-        self._graph.destroy_service(taken.name)
+    def _withdraw(self, command: ClientCommand) -> None:
+        self._graph.destroy_service(command.name)
 
-    def _request(self, taken: ClientCommand) -> ServiceReply:
-        return self._requests[taken.name][taken.request]
+    def _request(self, command: ClientCommand) -> ServiceReply:
+        return self._requests[command.name][command.request]
 
 
 def _has_no_subscribers(_answer: object) -> None:

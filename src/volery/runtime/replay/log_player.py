@@ -42,9 +42,9 @@ class LogPlayer(PlaybackControl):
 
     speed: factor of real time; None: as fast as possible. loop: whether playback starts over at the
     end; else it pauses there. on_load: called with the name of a scenario that a client requests,
-    or with None for no world. on_close: called when a client closes the log. shelf: scenarios and
+    or with None for no world. on_close: called when a client closes the log. catalog: scenarios and
     logs that clients can choose. own: the user's own scenario of the log's flight, for files that
-    its world needs; None: the shelf's scenario of that name, or files beside the log. Methods
+    its world needs; None: the catalog's scenario of that name, or files beside the log. Methods
     belong to one thread, which calls `wait` or `run`; others use `Gateway.post`. Raises
     `RecordingError` if there is no log, or no message in it.
     """
@@ -62,10 +62,10 @@ class LogPlayer(PlaybackControl):
         paused: bool = False,
         on_load: OnLoad | None = None,
         on_close: Callable[[], None] | None = None,
-        shelf: ScenarioCatalog | None = None,
+        catalog: ScenarioCatalog | None = None,
         own: Scenario | None = None,
     ) -> None:
-        super().__init__(path, speed=speed, loop=loop, paused=paused, shelf=shelf, own=own)
+        super().__init__(path, speed=speed, loop=loop, paused=paused, catalog=catalog, own=own)
         self.gateway = Gateway(
             self.graph,
             self._inbox.post,
@@ -77,7 +77,7 @@ class LogPlayer(PlaybackControl):
         """Budget for reading the log for new subscribers, all together."""
         self._clock = self.graph.advertise("/clock", Clock)
         self._playback.open(self.graph)
-        self._services = PlayerServices(self, on_load, shelf, on_close)
+        self._services = PlayerServices(self, on_load, catalog, on_close)
         self._rebase()
 
     # --------------------------------------------------------------------------------- its owner

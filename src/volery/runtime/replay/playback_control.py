@@ -43,7 +43,7 @@ class PlaybackControl:
         speed: float | None,
         loop: bool,
         paused: bool,
-        shelf: ScenarioCatalog | None,
+        catalog: ScenarioCatalog | None,
         own: Scenario | None,
     ) -> None:
         _check_speed(speed)
@@ -56,7 +56,7 @@ class PlaybackControl:
         """Whether `quit` has been called."""
         self.origin = self._known_origin()
         """Recorded scenario; None if the log has none."""
-        self.scenario: Scenario | None = self._known_scenario(own, shelf)
+        self.scenario: Scenario | None = self._known_scenario(own, catalog)
         """Scenario of the flight, for its world; None: unknown."""
         self._paused = paused
         self._speed = speed
@@ -203,23 +203,23 @@ class PlaybackControl:
         return None
 
     def _known_scenario(
-        self, own: Scenario | None, shelf: ScenarioCatalog | None
+        self, own: Scenario | None, catalog: ScenarioCatalog | None
     ) -> Scenario | None:
         origin, folder = self.origin, self.path.parent
         if own is not None and origin is not None:
             return scenario_of(origin, own, folder=folder)  # raises for another scenario
         with suppress(VoleryError):
             if origin is not None:
-                return scenario_of(origin, _of_shelf(shelf, origin.name), folder=folder)
+                return scenario_of(origin, _in_catalog(catalog, origin.name), folder=folder)
         return None
 
 
-def _of_shelf(shelf: ScenarioCatalog | None, name: str) -> Scenario | None:
+def _in_catalog(catalog: ScenarioCatalog | None, name: str) -> Scenario | None:
     """Returns a scenario of the catalog that is not shipped, and so may have files of its own."""
-    if shelf is None or name in library.names() or name not in shelf.names():
+    if catalog is None or name in library.names() or name not in catalog.names():
         return None
     with suppress(VoleryError):
-        return shelf.load(name)
+        return catalog.load(name)
     return None
 
 

@@ -44,12 +44,12 @@ def _placing(graph: Graph, world: SimulationWorld, name: str) -> Callable[[Publi
         if (frame := frame_of(message)) not in ("", "map"):
             graph.refuse(published.topic, f"poses are in 'map', not in '{frame}'")
             return
-        place, turn = message.pose.position, message.pose.orientation
+        position, turn = message.pose.position, message.pose.orientation
         attitude = [turn.x, turn.y, turn.z, turn.w]
         try:
             world.set_actor_pose(
                 name,
-                [place.x, place.y, place.z],
+                [position.x, position.y, position.z],
                 attitude if any(attitude) else None,
             )
         except CommandError as error:

@@ -36,7 +36,7 @@ from volery.runtime.vehicles.uav import Uav
 _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"
 _INVALID_POSE = 101
-_FASTEST = 100.0
+_MAX_TWIST = 100.0
 """Max speed that can be set, m/s or rad/s."""
 
 
@@ -150,14 +150,14 @@ class Entities:
             )
         if request.set_twist:
             twist = [_numbers(state.twist.linear), _numbers(state.twist.angular)]
-            if not np.isfinite(twist).all() or np.abs(twist).max() > _FASTEST:
-                reason = f"a twist is up to {_FASTEST:g} m/s or rad/s"
+            if not np.isfinite(twist).all() or np.abs(twist).max() > _MAX_TWIST:
+                reason = f"a twist is up to {_MAX_TWIST:g} m/s or rad/s"
                 raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         if entity.category is not Category.ROBOT:
             self._set_actor(entity, request)
             return
         if request.set_pose:
-            self._place(entity.name, state.pose)
+            self._set_pose(entity.name, state.pose)
         if request.set_twist:
             self._vehicles.set_velocity(entity.name, *twist)
 
@@ -175,7 +175,7 @@ class Entities:
             velocity = np.array(_numbers(request.state.twist.linear))
         self._world.set_actor_pose(entity.name, position, attitude, velocity)
 
-    def _place(self, name: str, pose: Any) -> None:
+    def _set_pose(self, name: str, pose: Any) -> None:
         turn = pose.orientation
         try:
             attitude = [turn.x, turn.y, turn.z, turn.w]

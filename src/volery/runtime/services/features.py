@@ -72,7 +72,7 @@ def offer_features(
 ) -> None:
     """Creates `/get_simulator_features`."""
     features = [f for f in Feature if f in offered and (f not in _ON_CONDITION or loads_worlds)]
-    told = filled(
+    message = filled(
         "simulation_interfaces/msg/SimulatorFeatures",
         {
             "features": np.array(features, dtype=np.uint16),
@@ -81,4 +81,6 @@ def offer_features(
         },
     )
     response = message_type(f"{_SRV}_Response")
-    graph.create_service("/get_simulator_features", _SRV, lambda _request: response(features=told))
+    graph.create_service(
+        "/get_simulator_features", _SRV, lambda _request: response(features=message)
+    )

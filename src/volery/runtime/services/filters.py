@@ -77,12 +77,12 @@ def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
     if len(points) != 2 or not np.isfinite(points).all():
         raise RefusedError(ResultCode.OPERATION_FAILED, "bounds need two finite points")
     if kind == BoundsType.SPHERE:
-        center, reach = points[0], float(points[1, 0])
-        if reach < 0.0:
+        center, sphere_radius = points[0], float(points[1, 0])
+        if sphere_radius < 0.0:
             raise RefusedError(
                 ResultCode.OPERATION_FAILED, "the radius of a sphere must not be negative"
             )
-        return lambda position, radius: _distance(position, center) <= reach + radius
+        return lambda position, radius: _distance(position, center) <= sphere_radius + radius
     low, high = points.min(axis=0), points.max(axis=0)
     return lambda position, radius: _distance(position, np.clip(position, low, high)) <= radius
 

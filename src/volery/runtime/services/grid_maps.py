@@ -33,7 +33,7 @@ _OURS = "volery_interfaces/srv"
 _BLOCKED, _FREE = 100, 0
 _BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked."""
-_LARGEST = 1e6
+_MAX_COMPONENT = 1e6
 """Max component of a quaternion, which need not be of unit length."""
 _LEVEL = 1e-3
 """Max x and y, relative to the norm, of the quaternion of a level origin."""
@@ -45,10 +45,10 @@ def offer_grid_maps(
     """Publishes the map on `/map`, latched; receives `/map_command`; creates the services."""
     publisher = graph.advertise("/map", OccupancyGrid, latched=True)
 
-    def tell(grid: GridMap) -> None:
+    def publish(grid: GridMap) -> None:
         publisher.publish(occupancy_of(grid, now_ns()))
 
-    def take(published: Published) -> None:
+    def receive(published: Published) -> None:
         present = world.current
         height_m = settings.block_height_m if present is None else present.block_height_m
         try:
@@ -79,10 +79,10 @@ def offer_grid_maps(
             "columns": grid.columns,
         }
 
-    world.tell = tell
+    world.on_change = publish
     if world.current is not None:
-        tell(world.current)
-    graph.subscribe("/map_command", take, OccupancyGrid)
+        publish(world.current)
+    graph.subscribe("/map_command", receive, OccupancyGrid)
     offer_command(graph, "/volery/set_grid_map", f"{_OURS}/SetGridMap", change)
     offer_command(graph, "/volery/get_grid_map", f"{_OURS}/GetGridMap", get)
 
@@ -108,14 +108,14 @@ def grid_of(message: Any, block_height_m: float, *, unknown_is_blocked: bool = F
     Cells of 50 per cent and more are blocked, unknown ones (-1) if `unknown_is_blocked`. The
     height of the origin is ignored: blocks stand on the ground.
     """
-    info, place = message.info, message.info.origin.position
+    info, origin = message.info, message.info.origin.position
     if frame_of(message) not in ("", "map"):
         raise CommandError(f"maps are in 'map', not in '{frame_of(message)}'")
     data: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
     rows, columns = int(info.height), int(info.width)
     if data.size != rows * columns:
         raise CommandError(f"{columns} x {rows} cells need as many entries, not {data.size}")
-    if not (math.isfinite(place.x) and math.isfinite(place.y) and math.isfinite(info.resolution)):
+    if not (math.isfinite(origin.x) and math.isfinite(origin.y) and math.isfinite(info.resolution)):
         raise CommandError("origin and resolution of a map must be finite")
     blocked = data >= _BLOCKED_FROM
     if unknown_is_blocked:
@@ -125,14 +125,14 @@ def grid_of(message: Any, block_height_m: float, *, unknown_is_blocked: bool = F
         blocked.reshape(rows, columns),
         float(info.resolution),
         block_height_m,
-        (float(place.x), float(place.y)),
+        (float(origin.x), float(origin.y)),
         _yaw(info.origin.orientation),
     )
 
 
 def _yaw(turn: Any) -> float:
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
-    if not (np.abs(q) < _LARGEST).all():
+    if not (np.abs(q) < _MAX_COMPONENT).all():
         raise CommandError(f"the origin of a map is turned by {q.tolist()}, which is no rotation")
     length = float(np.linalg.norm(q))
     if length == 0.0:  # the message has no orientation

@@ -59,7 +59,7 @@ class _LockStepTopics:
         )
         self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)
         self._subscription = graph.subscribe(self._done, self._end, Clock)
-        self._meeting_ns = -1
+        self._barrier_ns = -1
 
     def _is_there(self) -> bool:
         """Returns whether the client can still respond; cleans up after one that left."""
@@ -73,7 +73,7 @@ class _LockStepTopics:
         self._subscription.cancel()
 
     def _begin(self, time_ns: int) -> None:
-        self._meeting_ns = time_ns
+        self._barrier_ns = time_ns
         self._go.publish(Clock(time_from_ns(time_ns)))
         self._graph.deliver()
 
@@ -82,6 +82,6 @@ class _LockStepTopics:
             self._clear_away()
             return
         stamp = published.message.clock
-        if stamp.sec * NS_PER_S + stamp.nanosec == self._meeting_ns:
-            self._meeting_ns = -1
+        if stamp.sec * NS_PER_S + stamp.nanosec == self._barrier_ns:
+            self._barrier_ns = -1
             self._partner.reply()

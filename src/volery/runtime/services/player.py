@@ -29,7 +29,7 @@ _SRV = "simulation_interfaces/srv"
 _OURS = "volery_interfaces"
 _ALREADY_THERE = 101
 _STATE = f"{_OURS}/msg/PlayerState"
-_MOST_STEPS = 1_000_000_000
+_MAX_STEPS = 1_000_000_000
 
 
 class PlayerServices:
@@ -39,7 +39,7 @@ class PlayerServices:
         self,
         player: PlaybackControl,
         on_load: OnLoad | None,
-        shelf: ScenarioCatalog | None,
+        catalog: ScenarioCatalog | None,
         on_close: Callable[[], None] | None = None,
     ) -> None:
         self._player = player
@@ -48,7 +48,7 @@ class PlayerServices:
         self._state = graph.advertise("/volery/player/state", _STATE, latched=True)
         loads = on_load is not None
         offer_features(graph, loads_worlds=loads, offered=PLAYER_FEATURES)
-        offer_worlds(graph, player.scenario, on_load, shelf)
+        offer_worlds(graph, player.scenario, on_load, catalog)
         standard: tuple[tuple[str, str, Handler], ...] = (
             ("get_simulation_state", "GetSimulationState", self._get_state),
             ("set_simulation_state", "SetSimulationState", self._set_state),
@@ -104,8 +104,8 @@ class PlayerServices:
 
     def _step(self, request: Any) -> None:
         steps = int(request.steps)
-        if not 1 <= steps <= _MOST_STEPS:
-            reason = f"steps must be 1 to {_MOST_STEPS}, not {steps}"
+        if not 1 <= steps <= _MAX_STEPS:
+            reason = f"steps must be 1 to {_MAX_STEPS}, not {steps}"
             raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         try:
             self._player.single_step(steps)
@@ -130,5 +130,5 @@ class PlayerServices:
         return {"message": f"{self._player.name} is closed"}
 
     def _info(self, _request: Any) -> Fields:
-        told = {**self._present(), **self._player.describe()}
-        return {**told, "counts": np.array(told["counts"], np.uint64)}
+        fields = {**self._present(), **self._player.describe()}
+        return {**fields, "counts": np.array(fields["counts"], np.uint64)}

@@ -84,9 +84,9 @@ def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> Non
 
 
 def offer_result_later(
-    graph: Graph, name: str, srvtype: str, ask: Callable[[Any, Settle], None]
+    graph: Graph, name: str, srvtype: str, begin: Callable[[Any, Settle], None]
 ) -> None:
-    """Creates a service of the standard that `ask(request, settle)` answers later."""
+    """Creates a service of the standard that `begin(request, settle)` answers later."""
 
     def handle(request: Any, reply: ServiceReply) -> None:
         def settle(outcome: Fields | Exception) -> None:
@@ -94,7 +94,7 @@ def offer_result_later(
             reply.answer(filled(f"{srvtype}_Response", {"result": result(), **fields}))
 
         try:
-            ask(request, settle)
+            begin(request, settle)
         except (RefusedError, VoleryError) as error:
             settle(error)
 

@@ -51,7 +51,7 @@ def open_services(
     end: EndOfRun,
     *,
     on_load: OnLoad | None,
-    shelf: ScenarioCatalog | None,
+    catalog: ScenarioCatalog | None,
     every: Callable[..., None],
 ) -> None:
     """Creates the standard's services and Volery's own; see `Simulation` for the arguments.
@@ -66,7 +66,7 @@ def open_services(
     SpawnServices(graph, vehicles).offer()
     run_state.offer()
     offer_steps(graph, clock, end)
-    offer_worlds(graph, scenario, on_load, shelf)
+    offer_worlds(graph, scenario, on_load, catalog)
     offer_named_poses(graph, vehicles.start_poses)
     offer_air_and_faults(graph, scenario.world, world, simulation.faults)
     if world.actors is not None:

@@ -23,7 +23,7 @@ from volery.runtime.services.results import (
 
 _SERVICE = "simulation_interfaces/srv/StepSimulation"
 _ACTION = "simulation_interfaces/action/SimulateSteps"
-_MOST_STEPS = 1_000_000_000
+_MAX_STEPS = 1_000_000_000
 CANCELLED = "cancelled"
 
 
@@ -34,20 +34,20 @@ def offer_steps(graph: Graph, clock: SimulationClock, end: EndOfRun) -> None:
     """
 
     def step(request: Any, settle: Settle) -> None:
-        def tell(steps: StepRequest) -> None:
+        def report(steps: StepRequest) -> None:
             if steps.over:
                 settle(_interrupted(steps) or {})
 
-        _begin(clock, end, int(request.steps), tell)
+        _begin(clock, end, int(request.steps), report)
 
     offer_result_later(graph, "/step_simulation", _SERVICE, step)
     graph.actions.create_server("/simulate_steps", _ACTION, lambda goal: _take(clock, end, goal))
 
 
-def _begin(clock: SimulationClock, end: EndOfRun, steps: int, tell: Any) -> StepRequest:
-    if not 1 <= steps <= _MOST_STEPS:
+def _begin(clock: SimulationClock, end: EndOfRun, steps: int, on_report: Any) -> StepRequest:
+    if not 1 <= steps <= _MAX_STEPS:
         raise RefusedError(
-            ResultCode.OPERATION_FAILED, f"steps must be 1 to {_MOST_STEPS}, not {steps}"
+            ResultCode.OPERATION_FAILED, f"steps must be 1 to {_MAX_STEPS}, not {steps}"
         )
     if end.waits:
         raise RefusedError(ResultCode.INCORRECT_STATE, end.notice)
@@ -56,13 +56,13 @@ def _begin(clock: SimulationClock, end: EndOfRun, steps: int, tell: Any) -> Step
             ResultCode.INCORRECT_STATE, "steps need a paused simulation; pause it first"
         )
     try:
-        return clock.single_step(steps, tell)
+        return clock.single_step(steps, on_report)
     except CommandError as error:  # the simulation was resumed meanwhile
         raise RefusedError(ResultCode.INCORRECT_STATE, str(error)) from None
 
 
 def _take(clock: SimulationClock, end: EndOfRun, goal: Goal) -> None:
-    def tell(steps: StepRequest) -> None:
+    def report(steps: StepRequest) -> None:
         progress = {"completed_steps": steps.made, "remaining_steps": steps.left}
         goal.feedback(filled(f"{_ACTION}_Feedback", progress))
         if not steps.over:
@@ -76,7 +76,7 @@ def _take(clock: SimulationClock, end: EndOfRun, goal: Goal) -> None:
             goal.abort(_result(failed(interrupted)))
 
     try:
-        request = _begin(clock, end, int(goal.request.steps), tell)
+        request = _begin(clock, end, int(goal.request.steps), report)
     except RefusedError as refusal:
         goal.abort(_result(failed(refusal)))
         return

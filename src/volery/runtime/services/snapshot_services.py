@@ -13,8 +13,8 @@ from volery.runtime.services.results import Fields, offer_command
 from volery.runtime.snapshot import Snapshot
 
 _OURS = "volery_interfaces/srv"
-_MOST_STATES = 16
-_LONGEST_NAME = 100
+_MAX_SNAPSHOTS = 16
+_MAX_NAME_LENGTH = 100
 
 
 class SnapshotOwner(Protocol):
@@ -41,13 +41,13 @@ class SnapshotServices:
         self._owner = owner
         self._clock = clock
         self._vehicles = vehicles
-        self._kept: dict[str, Snapshot] = {}
+        self._snapshots: dict[str, Snapshot] = {}
 
     def offer(self) -> None:
         """Creates the services."""
         graph = self._graph
         for name, handler in (
-            ("save_snapshot", self._keep),
+            ("save_snapshot", self._save),
             ("restore_snapshot", self._restore),
             ("delete_snapshot", self._forget),
             ("reset_uav", lambda request: self._vehicles.reset(request.name)),
@@ -56,33 +56,33 @@ class SnapshotServices:
         offer_command(graph, "/volery/list_snapshots", f"{_OURS}/ListSnapshots", self._list)
         offer_command(graph, "/volery/set_speed", f"{_OURS}/SetSpeed", self._set_speed)
 
-    def _keep(self, request: Any) -> Fields:
+    def _save(self, request: Any) -> Fields:
         name = request.name
-        if not 0 < len(name) <= _LONGEST_NAME:
-            raise CommandError(f"the name of a snapshot has 1 to {_LONGEST_NAME} characters")
-        if name not in self._kept and len(self._kept) >= _MOST_STATES:
-            raise CommandError(f"{_MOST_STATES} snapshots are saved; delete one first")
-        kept = self._kept[name] = self._owner.snapshot()
-        return {"message": f"saved the state at {kept.time_s:.3f} s"}
+        if not 0 < len(name) <= _MAX_NAME_LENGTH:
+            raise CommandError(f"the name of a snapshot has 1 to {_MAX_NAME_LENGTH} characters")
+        if name not in self._snapshots and len(self._snapshots) >= _MAX_SNAPSHOTS:
+            raise CommandError(f"{_MAX_SNAPSHOTS} snapshots are saved; delete one first")
+        snapshot = self._snapshots[name] = self._owner.snapshot()
+        return {"message": f"saved the state at {snapshot.time_s:.3f} s"}
 
     def _restore(self, request: Any) -> Fields:
-        kept = self._find(request.name)
-        self._owner.restore(kept)
-        return {"message": f"restored the state at {kept.time_s:.3f} s"}
+        snapshot = self._find(request.name)
+        self._owner.restore(snapshot)
+        return {"message": f"restored the state at {snapshot.time_s:.3f} s"}
 
     def _forget(self, request: Any) -> None:
         self._find(request.name)
-        del self._kept[request.name]
+        del self._snapshots[request.name]
 
     def _list(self, _request: Any) -> Fields:
-        stamps = [time_from_ns(kept.time_ns) for kept in self._kept.values()]
-        return {"names": list(self._kept), "stamps": stamps}
+        stamps = [time_from_ns(snapshot.time_ns) for snapshot in self._snapshots.values()]
+        return {"names": list(self._snapshots), "stamps": stamps}
 
     def _find(self, name: str) -> Snapshot:
-        if name not in self._kept:
-            known = ", ".join(self._kept) or "none"
+        if name not in self._snapshots:
+            known = ", ".join(self._snapshots) or "none"
             raise CommandError(f"there is no snapshot '{name}'; known: {known}")
-        return self._kept[name]
+        return self._snapshots[name]
 
     def _set_speed(self, request: Any) -> None:
         factor = request.factor

@@ -54,13 +54,13 @@ class SpawnServices:
 
     def _spawnables(self, _request: Any) -> Fields:
         types = self._vehicles.types
-        told = []
+        spawnables = []
         for name in self._vehicles.spawnable:
             kind = types.get(name)
             what = f"{kind.airframe}, {kind.plant}" if kind else "airframe with the usual sensors"
             fields = {"entity_resource": resource(name), "description": f"UAV: {what}"}
-            told.append(filled(f"{_MSG}/Spawnable", fields))
-        return {"spawnables": told}
+            spawnables.append(filled(f"{_MSG}/Spawnable", fields))
+        return {"spawnables": spawnables}
 
     def _spawn(self, request: Any) -> Fields:
         pose = request.initial_pose
@@ -76,12 +76,12 @@ class SpawnServices:
             reason = f"the namespace of a UAV is its name, /{name}; leave it empty"
             raise RefusedError(_NAMESPACE_INVALID, reason)
         try:
-            place, turn = pose.pose.position, pose.pose.orientation
+            position, turn = pose.pose.position, pose.pose.orientation
             attitude = [turn.x, turn.y, turn.z, turn.w]
             self._vehicles.spawn(
                 name,
                 request.entity_resource.uri,
-                [place.x, place.y, place.z],
+                [position.x, position.y, position.z],
                 attitude if any(attitude) else [0.0, 0.0, 0.0, 1.0],
             )
         except SpawnError as error:
@@ -114,14 +114,14 @@ class SpawnServices:
 
     def _name(self, request: Any) -> str:
         """Returns the requested name, or a free one where that is allowed or no name is given."""
-        wished, taken = str(request.name), self._vehicles.names
-        if wished and not (wished in taken and request.allow_renaming):
+        wished, names = str(request.name), self._vehicles.names
+        if wished and not (wished in names and request.allow_renaming):
             return wished
         if not wished and not request.allow_renaming:
             raise RefusedError(_NAME_INVALID, "name is empty, and allow_renaming is false")
         stem = f"{wished}_" if wished else "uav"
         free = (f"{stem}{number}" for number in itertools.count(1))
-        return next(name for name in free if name not in taken)
+        return next(name for name in free if name not in names)
 
 
 def resource(uri: str) -> Any:

@@ -72,7 +72,7 @@ def _take_off(uav: Uav, request: Any) -> None:
 
 
 def _go_to(uav: Uav, request: Any) -> None:
-    place = request.position
+    position = request.position
     if uav.mode is FlightMode.TAKE_OFF:
         raise CommandError(f"{uav.name} takes off; wait until it holds")
-    uav.go_to([place.x, place.y, place.z], None if request.keep_heading else request.yaw)
+    uav.go_to([position.x, position.y, position.z], None if request.keep_heading else request.yaw)

@@ -57,7 +57,7 @@ class WeatherTopics:
 
         graph.subscribe("/weather_command", take, _TYPE)
 
-    def tell(self, weather: Weather) -> None:
+    def publish(self, weather: Weather) -> None:
         """Publishes the weather."""
         gusts = [_gust_message(gust) for gust in weather.gusts]
         fields = {**fields_of(self._world, weather), "gusts": gusts}
@@ -93,15 +93,15 @@ def changed(weather: Weather, message: Any, only: Collection[str] = ()) -> Weath
     for name in only:
         if name not in _SETTABLE:
             raise CommandError(f"only = '{name}'; known: {', '.join(_SETTABLE)}")
-    taken = set(only or _SETTABLE)
+    names = set(only or _SETTABLE)
     values: dict[str, Any] = {}
-    if "wind" in taken:
+    if "wind" in names:
         values["velocity_map"] = (message.wind.x, message.wind.y, message.wind.z)
-    if "w20" in taken:
+    if "w20" in names:
         values["w20_m_s"] = message.w20
-    if "hour_of_day" in taken and message.hour_of_day != 0.0:
+    if "hour_of_day" in names and message.hour_of_day != 0.0:
         values["hour_of_day"] = message.hour_of_day
-    particles = {key: getattr(message, name) for name, key in _PARTICLES.items() if name in taken}
+    particles = {key: getattr(message, name) for name, key in _PARTICLES.items() if name in names}
     for key, value in particles.items():
         if key.endswith("visibility_m") and value == 0.0:
             particles[key] = math.inf

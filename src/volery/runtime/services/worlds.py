@@ -40,35 +40,36 @@ def offer_worlds(
     graph: Graph,
     loaded: Scenario | None,
     on_load: OnLoad | None,
-    shelf: ScenarioCatalog | None = None,
+    catalog: ScenarioCatalog | None = None,
 ) -> None:
     """Creates the services that list worlds, and load and unload them where `on_load` is given.
 
     The owner of the simulation implements `on_load`: the process builds another simulation, or
-    none. `loaded` is the present scenario; `shelf` provides scenarios and logs, None: the library.
+    none. `loaded` is the present scenario; `catalog` provides scenarios and logs, None: the
+    library.
     """
-    shelf = shelf or ScenarioCatalog()
+    catalog = catalog or ScenarioCatalog()
 
     def available(request: Any) -> Fields:
         passes = tag_filter(request.filter)
         if list(request.additional_sources) and not request.continue_on_error:
             reason = "there are no sources of worlds except the library of scenarios"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
-        names = shelf.names()
-        worlds = [_read(shelf, name) for name in names]
+        names = catalog.names()
+        worlds = [_read(catalog, name) for name in names]
         return {"worlds": [_world(s, names) for s in worlds if passes(tags_of(s))]}
 
     def current(_request: Any) -> Fields:
         if loaded is None:
             raise RefusedError(_NO_WORLD, "no world is loaded")
-        return {"world": _world(loaded, shelf.names())}
+        return {"world": _world(loaded, catalog.names())}
 
     def load(request: Any) -> Fields:
-        scenario = _wanted(request.world_resource, shelf) if on_load is not None else None
+        scenario = _requested(request.world_resource, catalog) if on_load is not None else None
         if scenario is not None:
             _check_start(scenario)
         change(None if scenario is None else WorldRequest(scenario.name))
-        return {"world": _world(scenario, shelf.names())} if scenario is not None else {}
+        return {"world": _world(scenario, catalog.names())} if scenario is not None else {}
 
     def unload(_request: Any) -> None:
         if loaded is None:
@@ -76,7 +77,7 @@ def offer_worlds(
         change(None)
 
     def play(request: Any) -> Fields:
-        change(LogRequest(shelf.log(request.name)))
+        change(LogRequest(catalog.log(request.name)))
         return {"message": f"{request.name} is being opened"}
 
     def change(request: WorldRequest | LogRequest | None) -> None:
@@ -93,7 +94,7 @@ def offer_worlds(
     offer_result(graph, "/load_world", f"{_SRV}/LoadWorld", load)
     offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
     offer_command(graph, "/volery/play_recording", "volery_interfaces/srv/PlayRecording", play)
-    offer_choices(graph, shelf.names, lambda name: _read(shelf, name), change)
+    offer_choices(graph, catalog.names, lambda name: _read(catalog, name), change)
 
 
 def _check_start(scenario: Scenario) -> None:
@@ -112,16 +113,16 @@ def tags_of(scenario: Scenario) -> list[str]:
     return [f"{world.terrain.kind}_ground", *there]
 
 
-def _wanted(source: Any, shelf: ScenarioCatalog) -> Scenario:
+def _requested(source: Any, catalog: ScenarioCatalog) -> Scenario:
     if source.resource_string:
         raise RefusedError(_UNSUPPORTED_FORMAT, "worlds are loaded by name, not from a string")
     if not source.uri:
         raise RefusedError(_NO_RESOURCE, "uri must be the name of a scenario of the library")
-    if source.uri not in shelf.names():
-        known = ", ".join(shelf.names())
+    if source.uri not in catalog.names():
+        known = ", ".join(catalog.names())
         raise RefusedError(ResultCode.NOT_FOUND, f"no scenario '{source.uri}'; known: {known}")
     try:
-        return _read(shelf, source.uri)
+        return _read(catalog, source.uri)
     except ScenarioError as error:
         raise RefusedError(_PARSE_ERROR, str(error)) from None
 
@@ -131,8 +132,8 @@ def _shipped(name: str) -> Scenario:
     return load_scenario(name)
 
 
-def _read(shelf: ScenarioCatalog, name: str) -> Scenario:
-    return _shipped(name) if name in library.names() else shelf.load(name)
+def _read(catalog: ScenarioCatalog, name: str) -> Scenario:
+    return _shipped(name) if name in library.names() else catalog.load(name)
 
 
 def _world(scenario: Scenario, names: Collection[str]) -> Any:

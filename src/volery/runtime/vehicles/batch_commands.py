@@ -147,7 +147,7 @@ class BatchCommands(Uncopied, ABC):
         limits = self._find_limits()
         velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
         rates = limits.yaw_rates(self._flat("yaw rate", yaw_rate))
-        self._check_reach("command_velocity", _NOT_GUIDED)
+        self._check_accepted("command_velocity", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             fleet.command_velocities(velocities[rows], rates[rows])
         self._replace_futures("command_velocity", FlightMode.VELOCITY)
@@ -159,7 +159,7 @@ class BatchCommands(Uncopied, ABC):
         limits = self._find_limits()
         velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
-        self._check_reach("command_velocity_map", _NOT_GUIDED)
+        self._check_accepted("command_velocity_map", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             fleet.command_map_velocities(velocities[rows], _of(yaws, rows), rates[rows])
         self._replace_futures("command_velocity_map", FlightMode.VELOCITY)
@@ -171,7 +171,7 @@ class BatchCommands(Uncopied, ABC):
         limits = self._find_limits()
         accelerations = limits.accelerations(self._flat("acceleration", acceleration_map, (3,)))
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
-        self._check_reach("command_acceleration", _NOT_GUIDED)
+        self._check_accepted("command_acceleration", _NOT_GUIDED)
         for i, uav in self._guided():
             angle = None if yaws is None else float(yaws[i])
             uav.command_acceleration(accelerations[i], angle, float(rates[i]))
@@ -198,7 +198,7 @@ class BatchCommands(Uncopied, ABC):
             ),
         }
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
-        self._check_reach("command_setpoint", _NOT_GUIDED)
+        self._check_accepted("command_setpoint", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             own = {name: values[rows] for name, values in setpoints.items()}
             fleet.command_setpoints(own, _of(yaws, rows), rates[rows])
@@ -268,16 +268,16 @@ class BatchCommands(Uncopied, ABC):
             try:
                 begin(self._handles()[0])  # it refuses, and says why
             except CommandError as error:
-                under_way = any(uav.pending_command for uav in self._handles())
-                advice = "; wait() waits for their present commands" if under_way else ""
+                has_pending = any(uav.pending_command for uav in self._handles())
+                advice = "; wait() waits for their present commands" if has_pending else ""
                 raise CommandError(f"{command} reaches no UAV: {error}{advice}") from None
         return FlightFutureList([begin(uav) for uav in uavs], self._now_s)
 
     def _now_s(self) -> float:
         return s_from_ns(self._fleets()[0][0].time_ns)
 
-    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
-        """Refuses a command that streams if all UAVs are in `deaf` modes; environments do not."""
+    def _check_accepted(self, command: str, ignoring: Collection[FlightMode]) -> None:
+        """Refuses a streamed command if all UAVs are in `ignoring` modes; environments do not."""
 
     def _guided(self) -> list[tuple[int, Uav]]:
         """Returns the UAVs that guided commands reach, with their rows."""
@@ -290,7 +290,7 @@ class BatchCommands(Uncopied, ABC):
     def _command_all(
         self, command: str, level: ControlLevel, setpoints: Mapping[str, Array | float]
     ) -> None:
-        self._check_reach(command, _NOT_LOW_LEVEL)
+        self._check_accepted(command, _NOT_LOW_LEVEL)
         for fleet, rows in self._fleets():
             own = {
                 name: values[rows] if isinstance(values, np.ndarray) else values

@@ -98,21 +98,21 @@ def go_to_message(uav: Uav, message: Any) -> None:
     """
     if frame_of(message) not in ("", "map"):
         raise CommandError(f"goals are in 'map', not in '{frame_of(message)}'")
-    place, turn = message.pose.position, message.pose.orientation
+    position, turn = message.pose.position, message.pose.orientation
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
     if not np.isfinite(q).all():
         raise CommandError("the rotation of a goal must be finite")
-    uav.go_to([place.x, place.y, place.z], rotations.heading_of(q))
+    uav.go_to([position.x, position.y, position.z], rotations.heading_of(q))
 
 
 def stand_at_message(uav: Uav, message: Any) -> None:
     """Sets the pose of a kinematic `uav` from a PoseStamped in the map. Raises `CommandError`."""
     if frame_of(message) not in ("", "map"):
         raise CommandError(f"poses are in 'map', not in '{frame_of(message)}'")
-    place, turn = message.pose.position, message.pose.orientation
+    position, turn = message.pose.position, message.pose.orientation
     stamp = message.header.stamp
     uav.command_pose(
-        [place.x, place.y, place.z],
+        [position.x, position.y, position.z],
         [turn.x, turn.y, turn.z, turn.w],
         stamp_ns=stamp.sec * NS_PER_S + stamp.nanosec,
     )
@@ -125,10 +125,10 @@ def _careful(
 
     streamed: messages that a mode ignores are no news for a client, which repeats them.
     """
-    told = False
+    has_warned = False
 
     def receive(published: Published) -> None:
-        nonlocal told
+        nonlocal has_warned
         if uav.mode in _BUSY or uav.rotors_stopped:
             if not streamed:
                 state = f"is in mode {uav.mode.name}" if uav.mode in _BUSY else "was killed"
@@ -139,8 +139,8 @@ def _careful(
         except (CommandError, AttributeError) as error:
             if not (streamed and uav.mode in _DOWN):
                 graph.refuse(topic, str(error))
-            if not told and uav.mode not in _DOWN:
-                told = True
+            if not has_warned and uav.mode not in _DOWN:
+                has_warned = True
                 _log.warning("%s: a command is not obeyed: %s", topic, error)
 
     return receive

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection
 
 from volery.core.errors import CommandError
 
-MOST_CHARACTERS = 40
+MAX_CHARACTERS = 40
 """Max length of an operator's name."""
 
 
@@ -23,10 +23,10 @@ def operator_name(text: str) -> str:
     with single spaces inside. Names that differ in case alone are equal (`same_operator`).
     """
     plain = unicodedata.normalize("NFKC", text)
-    kept = (
+    characters = (
         " " if c.isspace() else c for c in plain if c.isspace() or unicodedata.category(c)[0] != "C"
     )
-    return " ".join("".join(kept).split())
+    return " ".join("".join(characters).split())
 
 
 def same_operator(one: str, other: str) -> bool:
@@ -54,21 +54,21 @@ class ControlAuthority:
     ) -> None:
         self._names = names
         self.moved_by = moved_by
-        self._holders: dict[str, str] = {}
+        self._operators: dict[str, str] = {}
 
-    def holder_of(self, uav: str) -> str:
+    def operator_of(self, uav: str) -> str:
         """Returns the name of the operator in control of a UAV; empty: none."""
-        return self._holders.get(uav, "")
+        return self._operators.get(uav, "")
 
     def held_by(self, operator: str) -> tuple[str, ...]:
         """Returns the UAVs that an operator controls."""
-        return tuple(uav for uav, by in self._holders.items() if same_operator(by, operator))
+        return tuple(uav for uav, by in self._operators.items() if same_operator(by, operator))
 
     def take(self, uav: str, operator: str) -> None:
         """Gives control of a UAV to an operator. Raises `CommandError` if another one has it."""
         name = _checked_name(operator)
         self._check_free(uav, name)
-        self._holders[uav] = name
+        self._operators[uav] = name
 
     def release(self, uav: str, operator: str) -> None:
         """Releases a UAV, or all if none is named. Raises `CommandError` if another one has it."""
@@ -76,30 +76,30 @@ class ControlAuthority:
             self.leave(operator)
             return
         self._check_held(uav, operator)
-        del self._holders[uav]
+        del self._operators[uav]
 
     def hand_over(self, uav: str, operator: str, to: str) -> None:
         """Hands a UAV over to another operator. Raises `CommandError` if `operator` lacks it."""
         name = _checked_name(to)
         self._check_held(uav, operator)
-        self._holders[uav] = name
+        self._operators[uav] = name
 
     def leave(self, operator: str) -> None:
         """Releases all UAVs of an operator who has left."""
         for uav in self.held_by(operator):
-            del self._holders[uav]
+            del self._operators[uav]
 
     def _check_free(self, uav: str, operator: str) -> None:
         names = self._names()
         if uav not in names:
             raise CommandError(f"there is no UAV '{uav}'; known: {', '.join(names)}")
-        holder = self.holder_of(uav)
-        if holder and not same_operator(holder, operator):
-            raise CommandError(f"{uav} is held by {holder}, who can hand it over")
+        present = self.operator_of(uav)
+        if present and not same_operator(present, operator):
+            raise CommandError(f"{uav} is held by {present}, who can hand it over")
 
     def _check_held(self, uav: str, operator: str) -> None:
         self._check_free(uav, operator)
-        if uav not in self._holders:
+        if uav not in self._operators:
             raise CommandError(
                 f"{operator or 'an operator without a name'} does not hold {uav}; take it first"
             )
@@ -107,9 +107,9 @@ class ControlAuthority:
 
 def _checked_name(operator: str) -> str:
     name = operator_name(operator)
-    if not name or len(name) > MOST_CHARACTERS or len(operator) > 4 * MOST_CHARACTERS:
+    if not name or len(name) > MAX_CHARACTERS or len(operator) > 4 * MAX_CHARACTERS:
         raise CommandError(
-            f"an operator needs a name of 1 to {MOST_CHARACTERS} printable characters, "
+            f"an operator needs a name of 1 to {MAX_CHARACTERS} printable characters, "
             f"not {operator[:60]!r}"
         )
     return name

@@ -1,8 +1,8 @@
 """Determines which UAVs a graph name, or the arguments of a request, concern.
 
 It finds at least every UAV that the graph would resolve a spelling to, for topics, services,
-actions and parameters; doubtful cases count as matches. What a name moves without telling it, its
-receiver declares: `graph.moved_uavs`.
+actions and parameters; doubtful cases count as matches. If a name moves a UAV that it does not
+contain, its receiver declares it: `graph.moved_uavs`.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from volery.runtime.services.results import Close
 from volery.scenario.schema import EstimateSensor, ExternalOdometrySource, Sensor
 
 _LOOK_S = 0.1
-_SILENT_S, _TOLD_S = 2.0, 5.0
+_SILENT_S, _REPORTED_S = 2.0, 5.0
 """Times without poses, s: after the first the estimate of a landed UAV is kept at rest, after the
 second an event is logged. Modelling choices."""
 
@@ -74,7 +74,7 @@ class ExternalOdometry:
             silent_s = (now - since) / NS_PER_S
             if silent_s >= _SILENT_S and engine.fleet.mode(row) is FlightMode.LANDED:
                 estimation.stand_still(row, now)
-            if _TOLD_S <= silent_s < _TOLD_S + _LOOK_S:  # once, without state to save
+            if _REPORTED_S <= silent_s < _REPORTED_S + _LOOK_S:  # once, without state to save
                 engine.note(
                     row, EventKind.FAULT, f"receives no poses on {topic}: its estimate drifts"
                 )
@@ -92,11 +92,11 @@ def _taker(
         )
 
         stamp_ns = stamp_of(published.message)
-        place, turn = _read(published.message)
-        readable = np.isfinite(place).all() and 0.9 < norm(turn) < 1.1
+        position, turn = _read(published.message)
+        readable = np.isfinite(position).all() and 0.9 < norm(turn) < 1.1
         if not readable or stamp_ns > engine.time_ns or engine.estimation is None:
             return
-        pose = PoseMeasurement(stamp_ns, place, turn, aid.sigma_m, sigma_rad)
+        pose = PoseMeasurement(stamp_ns, position, turn, aid.sigma_m, sigma_rad)
         engine.estimation.take_pose(engine.names.index(uav_name), pose, gap_ns=gap_ns)
 
     return take

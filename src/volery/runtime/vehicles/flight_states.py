@@ -39,13 +39,13 @@ class FlightStates:
         self._engine = engine
         self._origin = origin
         self._publishers: dict[str, Publisher] = {}
-        self._wanted_list: list[tuple[int, Publisher]] = []
+        self._subscribed: list[tuple[int, Publisher]] = []
         self._seen: tuple[int, tuple[str, ...]] | None = None
         """Changes of the graph, and names of the UAVs, to which the list belongs."""
 
     def start(self, every: Callable[..., None]) -> None:
         """Publishes each `PERIOD_S` of simulated time from now on."""
-        every(PERIOD_S, self._publish, wanted=lambda: bool(self._wanted()))
+        every(PERIOD_S, self._publish, wanted=lambda: bool(self._find_subscribed()))
 
     def open(self, uav: Uav) -> Iterator[Close]:
         """Adds a UAV; yields the functions that remove it."""
@@ -61,27 +61,27 @@ class FlightStates:
             self._graph, f"/{uav.name}/get_vehicle_info", _BUILD, lambda _request: self._build(uav)
         )
 
-    def _wanted(self) -> list[tuple[int, Publisher]]:
+    def _find_subscribed(self) -> list[tuple[int, Publisher]]:
         """Returns the rows and publishers of UAVs whose topic has subscribers."""
         now = self._graph.changes, self._engine.names
         if self._seen is None or now[0] != self._seen[0] or now[1] is not self._seen[1]:
             self._seen = now
             found = [(k, self._publishers.get(name)) for k, name in enumerate(now[1])]
-            self._wanted_list = [(k, own) for k, own in found if own and own.subscriptions]
-        return self._wanted_list
+            self._subscribed = [(k, own) for k, own in found if own and own.subscriptions]
+        return self._subscribed
 
     def _publish(self) -> None:
-        wanted = self._wanted()
-        for (_, publisher), message in zip(wanted, self._messages(wanted), strict=True):
+        subscribed = self._find_subscribed()
+        for (_, publisher), message in zip(subscribed, self._messages(subscribed), strict=True):
             if publisher.has_internal_subscribers:
                 publisher.publish(message)
             else:
                 publisher.publish_external(message)
 
-    def _messages(self, wanted: list[tuple[int, Publisher]]) -> Iterator[Any]:
+    def _messages(self, subscribed: list[tuple[int, Publisher]]) -> Iterator[Any]:
         engine = self._engine
         fleet, state = engine.fleet, engine.fleet.state
-        rows = np.array([k for k, _ in wanted], np.int64)
+        rows = np.array([k for k, _ in subscribed], np.int64)
         motion, rates = fleet.believed(rows)
         in_air = (fleet.modes != FlightMode.LANDED) & ~state.on_ground & ~state.asleep
         battery = (state.battery_charge, state.battery_voltage, state.battery_current)
@@ -100,32 +100,32 @@ class FlightStates:
             strict=True,
         )
         stamp = header(engine.time_ns, "map")
-        one = message_type(_TYPE)
-        for k, mode, airborne, crashed, place, q, v, w, a, power in columns:
+        state_type = message_type(_TYPE)
+        for k, mode, airborne, crashed, position, q, v, w, a, power in columns:
             airframe = fleet.airframes[k]
             rotors = airframe.rotors
-            shares = state.rotor_speed[k, : len(rotors.places)] / rotors.max_speed_rad_s
-            yield one(
+            fractions = state.rotor_speed[k, : len(rotors.places)] / rotors.max_speed_rad_s
+            yield state_type(
                 stamp,
                 _MODES[mode],
                 airborne,
                 crashed,
-                Pose(Point(*place), Quaternion(*q)),
+                Pose(Point(*position), Quaternion(*q)),
                 Vector3(*v),
                 Vector3(*w),
                 Vector3(*a),
                 *(_NO_BATTERY if airframe.battery is None else power),
-                shares.astype(np.float32),
+                fractions.astype(np.float32),
             )
 
     def _build(self, uav: Uav) -> Fields:
         airframe = uav.airframe
         limits, battery, origin = airframe.limits, airframe.battery, self._origin
-        most_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
+        max_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
         fields: dict[str, Any] = {
             "airframe": airframe.name,
             "rotors": len(airframe.rotors.places),
-            "hover_thrust": airframe.body.mass_kg * GRAVITY / most_thrust,
+            "hover_thrust": airframe.body.mass_kg * GRAVITY / max_thrust,
             "speed": limits.speed_m_s,
             "climb": limits.climb_m_s,
             "descent": limits.descent_m_s,

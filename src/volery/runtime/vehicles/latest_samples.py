@@ -29,7 +29,7 @@ class LatestSamples:
         """Last complete batch of each bank."""
         self._single: dict[str, tuple[Samples, int] | None] = {}
         """Batch and row by path, where they are not those of the bank; None: no sample yet."""
-        self._places: dict[str, tuple[int, int]] = {}
+        self._sensor_rows: dict[str, tuple[int, int]] = {}
         """Bank and row of each sensor by path."""
         self._mounts: dict[str, Mount] = {}
         self._kinds: dict[str, str] = {}
@@ -44,16 +44,18 @@ class LatestSamples:
 
     def arrange(self, banks: Sequence[SensorBank], fitted: Iterable[SensorInstance]) -> None:
         """Uses the banks of a changed fleet; the samples of sensors that go on stay."""
-        before = {path: self._found(path) for path in self._places}
+        before = {path: self._found(path) for path in self._sensor_rows}
         self._banks = tuple(bank for bank in banks if bank.name != "joints")
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(self._banks)}
-        self._places = {
+        self._sensor_rows = {
             sensor.path: (k, row)
             for k, bank in enumerate(self._banks)
             for row, sensor in enumerate(bank.sensors)
         }
         self._batches = {}
-        self._single = {path: before[path] for path in self._places if before.get(path) is not None}
+        self._single = {
+            path: before[path] for path in self._sensor_rows if before.get(path) is not None
+        }
         self._mounts, self._kinds = {}, {}
         names: dict[str, list[str]] = {}
         for sensor in fitted:
@@ -61,7 +63,7 @@ class LatestSamples:
             self._kinds[sensor.id.path] = sensor.spec.kind
             names.setdefault(sensor.id.uav_name, []).append(sensor.id.name)
         self._names = {uav: tuple(own) for uav, own in names.items()}
-        self._requested &= self._places.keys()
+        self._requested &= self._sensor_rows.keys()
 
     def names(self, uav: str) -> tuple[str, ...]:
         """Returns the names of a UAV's sensors, in the order of its type."""
@@ -70,7 +72,7 @@ class LatestSamples:
     def forget(self, uav: str) -> None:
         """Removes the samples of a UAV that is reset or deleted."""
         own = f"{uav}/"
-        for path in self._places:
+        for path in self._sensor_rows:
             if path.startswith(own):
                 self._single[path] = None
         for stream in self._streams:
@@ -113,7 +115,7 @@ class LatestSamples:
 
     def is_camera(self, uav: str, sensor: str) -> bool:
         """Returns whether a sensor is a camera."""
-        return self._banks[self._places[f"{uav}/{sensor}"][0]].name == "camera"
+        return self._banks[self._sensor_rows[f"{uav}/{sensor}"][0]].name == "camera"
 
     def requests(self, cameras: Sequence[SensorId]) -> bool:
         """Returns whether samples of any of these cameras are requested here."""
@@ -146,7 +148,7 @@ class LatestSamples:
     def _found(self, path: str) -> tuple[Samples, int] | None:
         if path in self._single:
             return self._single[path]
-        bank, row = self._places[path]
+        bank, row = self._sensor_rows[path]
         batch = self._batches.get(bank)
         return None if batch is None else (batch, row)
 

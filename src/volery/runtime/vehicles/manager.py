@@ -208,13 +208,13 @@ class VehicleManager:
     def _restoring(self) -> Callable[[], None]:
         """Returns a function that restores what refers to the present fleet."""
         starts, fitted, fleet = self.starts, self.fitted, self.outlet.fleet
-        places = {name: uav.fleet_row for name, uav in self.uavs.items()}
+        fleet_rows = {name: uav.fleet_row for name, uav in self.uavs.items()}
         banks = self.engine.banks
 
         def restore() -> None:
             self.starts, self.fitted, self.outlet.fleet = starts, fitted, fleet
             for name, uav in self.uavs.items():
-                uav.move_to(places[name])
+                uav.move_to(fleet_rows[name])
             self._sort_uavs()
             self.outlet.latest.arrange(banks, fitted)
 

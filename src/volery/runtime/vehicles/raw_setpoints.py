@@ -39,13 +39,13 @@ def steer_to_message(uav: Uav, message: Any) -> None:
     mask = int(message.type_mask)
     if mask & FORCE:
         raise CommandError("force setpoints are not supported; clear the FORCE bit of type_mask")
-    place = _vector(message.position, mask, IGNORE_POSITION, "position")
+    position = _vector(message.position, mask, IGNORE_POSITION, "position")
     velocity = _vector(message.velocity, mask, IGNORE_VELOCITY, "velocity")
     push = _vector(message.acceleration_or_force, mask, IGNORE_ACCELERATION, "acceleration")
     yaw = None if mask & IGNORE_YAW else float(message.yaw)
     rate = 0.0 if mask & IGNORE_YAW_RATE else float(message.yaw_rate)
     if message.coordinate_frame == HEADING_FRAME:
-        if place is not None:
+        if position is not None:
             raise CommandError("positions are in the map frame; use coordinate_frame 1")
         turn = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(uav.attitude))
         velocity = None if velocity is None else rotations.rotate(turn, velocity)
@@ -53,11 +53,11 @@ def steer_to_message(uav: Uav, message: Any) -> None:
     elif message.coordinate_frame != MAP_FRAME:
         raise CommandError(f"no setpoints in frame {message.coordinate_frame}; 1 and 8 are known")
     nothing = np.zeros(3)
-    if place is not None and velocity is None and push is None:
-        uav.go_to(place, yaw)
-    elif place is not None:
+    if position is not None and velocity is None and push is None:
+        uav.go_to(position, yaw)
+    elif position is not None:
         motion = (nothing if velocity is None else velocity, nothing if push is None else push)
-        uav.command_setpoint(place, *motion, yaw, rate)
+        uav.command_setpoint(position, *motion, yaw, rate)
     elif velocity is not None:
         uav.command_velocity_map(velocity, rate, yaw=yaw)
     elif push is not None:

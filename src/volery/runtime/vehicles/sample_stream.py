@@ -43,9 +43,9 @@ class SampleStream(Iterator[Any]):
 
     def take(self) -> list[Any]:
         """Returns the samples since the last call, oldest first, without a step."""
-        taken = list(self._queue)
+        samples = list(self._queue)
         self._queue.clear()
-        return taken
+        return samples
 
     def __next__(self) -> Any:
         """Returns the next sample; advances the simulation if none is queued."""

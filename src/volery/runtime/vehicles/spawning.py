@@ -20,8 +20,8 @@ from volery.core.errors import (
 )
 from volery.runtime.construction.placement import (
     StartPose,
-    check_place,
-    put_down,
+    check_position,
+    landed_pose,
     stands_on_ground,
 )
 from volery.runtime.snapshot_manager import SnapshotManager
@@ -39,7 +39,17 @@ from volery.scenario.schema import (
 from volery.vehicle.airframe import Airframe, airframe_names, load_airframe
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_command", "actors")
+_RESERVED = (
+    "volery",
+    "tf",
+    "tf_static",
+    "clock",
+    "events",
+    "rosapi",
+    "map",
+    "map_command",
+    "actors",
+)
 """Other names at the root of the graph."""
 
 
@@ -92,11 +102,11 @@ class Spawner:
             raise CommandError(reason) from error
 
     def _check_name(self, name: str) -> None:
-        if not _NAME.fullmatch(name) or name in _TAKEN:
+        if not _NAME.fullmatch(name) or name in _RESERVED:
             raise SpawnError(
                 SpawnFault.NAME,
                 f"'{name}' is no name for a UAV: up to 40 of a-z, 0-9 and _, a letter first, and "
-                f"none of {', '.join(_TAKEN)}",
+                f"none of {', '.join(_RESERVED)}",
             )
         if name in self._manager.uavs:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
@@ -122,23 +132,27 @@ class Spawner:
         position_map: ArrayLike,
         attitude: ArrayLike,
     ) -> StartPose:
-        place = np.asarray(position_map, dtype=np.float64)
-        if place.shape != (3,) or not np.isfinite(place).all():
+        position = np.asarray(position_map, dtype=np.float64)
+        if position.shape != (3,) or not np.isfinite(position).all():
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
         try:
             turn = checked_attitude(attitude)
         except CommandError as error:
             raise PlacementError(str(error)) from None
         slides = self._manager.scenario.types[kind].plant != "kinematic"
-        place, turn, at_rest = put_down(place, turn, airframe, self._terrain, name, slides=slides)
-        others = near(self._manager.starts, self._manager.engine.fleet.state.position_map, place)
-        check_place(place, airframe, self._scene, self._terrain, others, name, at_rest=at_rest)
-        stands = at_rest or stands_on_ground(place, airframe, self._terrain)
+        position, turn, at_rest = landed_pose(
+            position, turn, airframe, self._terrain, name, slides=slides
+        )
+        others = near(self._manager.starts, self._manager.engine.fleet.state.position_map, position)
+        check_position(
+            position, airframe, self._scene, self._terrain, others, name, at_rest=at_rest
+        )
+        stands = at_rest or stands_on_ground(position, airframe, self._terrain)
         return StartPose(
             name,
             kind,
             airframe,
-            place,
+            position,
             turn,
             on_ground=stands,
             takes_off=False,

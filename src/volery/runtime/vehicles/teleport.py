@@ -15,15 +15,15 @@ from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.runtime.construction.placement import (
     StartPose,
-    check_place,
-    put_down,
+    check_position,
+    landed_pose,
     raised,
     stands_on_ground,
 )
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.vehicle.kinematic import Kinematic
 
-_REACH_M = 10.0
+_NEAR_RADIUS_M = 10.0
 """Larger than the distance at which any two UAVs touch, m."""
 
 
@@ -36,7 +36,7 @@ class Teleporter:
         self._scene = manager.engine.scene
         self._terrain = manager.terrain
 
-    def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
+    def teleport(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
         """Teleports UAV `row` to (3,), m, and (4,), x y z w, map from body; its velocity continues.
 
         A flying UAV holds there; a landed one hovers if the position is in the air, and rests on
@@ -51,7 +51,7 @@ class Teleporter:
             turn, at_rest = checked_attitude(attitude), False
             if fleet.mode(row) is FlightMode.LANDED:
                 slides = not isinstance(fleet.plants[row], Kinematic)
-                position, turn, at_rest = put_down(
+                position, turn, at_rest = landed_pose(
                     position, turn, start.airframe, self._terrain, start.name, slides=slides
                 )
             else:
@@ -83,10 +83,12 @@ class Teleporter:
         around = near(self._manager.starts, present, position)
         others = [other for other in around if other.name != start.name]
         scene, terrain = self._scene, self._terrain
-        check_place(position, start.airframe, scene, terrain, others, start.name, at_rest=at_rest)
+        check_position(
+            position, start.airframe, scene, terrain, others, start.name, at_rest=at_rest
+        )
 
 
 def near(starts: Sequence[StartPose], present: Array, position: Array) -> list[StartPose]:
     """Returns the UAVs within 10 m of `position` (3,), m, moved to their `present` (N, 3), m."""
-    rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _REACH_M).tolist()
+    rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _NEAR_RADIUS_M).tolist()
     return [replace(starts[row], position_map=present[row]) for row in rows]

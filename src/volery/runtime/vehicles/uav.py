@@ -52,7 +52,7 @@ class Uav(Uncopied):
         futures: FlightFutures,
         path: str = "",
     ) -> None:
-        self._place: tuple[Fleet, int] | None = (fleet, row)
+        self._slot: tuple[Fleet, int] | None = (fleet, row)
         self.sensors = sensors
         self._futures = futures
         self._path = path or name
@@ -66,7 +66,7 @@ class Uav(Uncopied):
 
     def __repr__(self) -> str:
         kind = f" ({self.type_name})" if self.type_name else ""
-        if self._place is None:
+        if self._slot is None:
             return f"<Uav '{self._path}'{kind}: deleted>"
         x, y, z = self.position_map.tolist()
         return f"<Uav '{self._path}'{kind}: {self.mode.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m>"
@@ -90,12 +90,12 @@ class Uav(Uncopied):
 
     def move_to(self, place: tuple[Fleet, int] | None) -> None:
         """Follows the UAV to another fleet and row, or marks the UAV as deleted (None)."""
-        self._place = place
+        self._slot = place
 
     @property
     def is_deleted(self) -> bool:
         """Whether it was deleted; its state and commands then raise `CommandError`."""
-        return self._place is None
+        return self._slot is None
 
     @property
     def _fleet(self) -> Fleet:
@@ -111,9 +111,9 @@ class Uav(Uncopied):
         return self._found()
 
     def _found(self) -> tuple[Fleet, int]:
-        if self._place is None:
+        if self._slot is None:
             raise CommandError(f"{self.name} was deleted")
-        return self._place
+        return self._slot
 
     @property
     def airframe(self) -> Airframe:

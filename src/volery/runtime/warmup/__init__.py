@@ -1,7 +1,7 @@
 """Compiles a scenario's kernels before a run: at its first start, in two processes.
 
 On two cores this halves the wait, as numba compiles one function at a time per process. This
-process loads the helper's kernels from the cache on disk; marks there tell later starts that no
+process loads the helper's kernels from the cache on disk; marks there show later starts that no
 work is left.
 
     python -m volery.runtime.warmup

@@ -156,9 +156,9 @@ def _level(count: int = 2) -> NDArray[np.float64]:
 
 
 def _fleet(count: int = 2, plant: Plant | None = None) -> Fleet:
-    places = [[3.0 * row, 0.0, 1.0] for row in range(count)]
+    positions = [[3.0 * row, 0.0, 1.0] for row in range(count)]
     return Fleet(
-        [load_airframe("f450")] * count, places, _level(count), plants=plant or RigidBody()
+        [load_airframe("f450")] * count, positions, _level(count), plants=plant or RigidBody()
     )
 
 

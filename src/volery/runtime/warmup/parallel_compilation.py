@@ -34,7 +34,7 @@ def compiled(tasks: Sequence[Task]) -> Iterator[None]:
         yield
     else:
         with _helper(missing) as (helper, numbers):
-            for number in _taken_from(numbers):
+            for number in _indices_from(numbers):
                 do(missing[number])
             yield
             helper.wait()
@@ -52,7 +52,7 @@ def compile_all(tasks: Sequence[Task]) -> None:
 
 def help_with(names: Sequence[str]) -> None:
     """Runs some of the named tasks in the helper; their indices arrive through stdin."""
-    for number in _taken_from(sys.stdin.fileno()):
+    for number in _indices_from(sys.stdin.fileno()):
         do(task_of(names[number]))
 
 
@@ -79,7 +79,7 @@ def _helper(tasks: Sequence[Task]) -> Iterator[tuple[subprocess.Popen[bytes], in
         os.close(numbers)
 
 
-def _taken_from(numbers: int) -> Iterator[int]:
+def _indices_from(numbers: int) -> Iterator[int]:
     """Yields indices from a pipe that several processes read."""
     while number := os.read(numbers, 1):
         yield number[0]

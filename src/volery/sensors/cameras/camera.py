@@ -83,11 +83,11 @@ def take(
             if rotors is None
             else scene.handle_with_blades(rotors.at(start), rotors.at(end))
         )
-        reach = model.far_m / float(table.direction[:, 0].min())
+        max_range = model.far_m / float(table.direction[:, 0].min())
         optics = Optics(
             model.near_m,
             model.far_m,
-            reach,
+            max_range,
             model.readout_ns,
             model.exposure,
             model.read_noise,

@@ -49,7 +49,7 @@ class Optics(NamedTuple):
 
     near_m: float
     far_m: float
-    reach_m: float
+    max_range_m: float
     """Length of the longest ray: to depth `far_m` in the image's corner."""
     readout_ns: int
     exposure: float
@@ -109,7 +109,7 @@ def _near(
         bodies,
         (min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])),
         (max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])),
-        optics.reach_m,
+        optics.max_range_m,
         batch.uav[shot],
         near,
     )
@@ -172,8 +172,8 @@ def _write_geometry(
                 elif is_noisy:
                     drawn = normals[(random_bits(key, number + pixel) >> _DEPTH_BITS) & _LAST]
                     # Stereo noise acts on 1 / depth; where that becomes too small, depth is inf.
-                    share = f4(1.0) + f4(optics.depth_noise_per_m) * drawn * depth
-                    depth = depth / share if share * far > depth else f4(np.inf)
+                    factor = f4(1.0) + f4(optics.depth_noise_per_m) * drawn * depth
+                    depth = depth / factor if factor * far > depth else f4(np.inf)
                 frames.depth[shot, pixel] = depth
             if wants_labels:
                 frames.instance[shot, pixel] = instance[k] if seen else -1
@@ -261,7 +261,7 @@ def _render_piece(
         time = batch.sweep_start_ns[shot] + table.after_ns[first + p]
         fraction = (time - interval[0]) / length
         block.fraction[p] = min(max(fraction, 0.0), 1.0)
-    cast_block(own_scene, block, own * LANES, optics.reach_m, near_count)
+    cast_block(own_scene, block, own * LANES, optics.max_range_m, near_count)
     _write_geometry(table, optics, batch, block, first, own, shot, frames)
     if frames.colour.shape[1] > 0:
         note_hits(block, own, scratch)

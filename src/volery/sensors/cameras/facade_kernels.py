@@ -30,7 +30,7 @@ def _within(offset: Any, half: Any, edge: Any) -> Any:
 
 
 @inner_kernel
-def pane_share(
+def pane_fraction(
     look: NDArray[np.float32], x: Any, y: Any, z: Any, nx: Any, ny: Any, distance: Any
 ) -> tuple[Any, Any]:
     """Returns the fraction of glass at a wall's point, 0 to 1, and the number of its window.
@@ -51,9 +51,9 @@ def pane_share(
     if row == f4(0.0):
         half_width, above, half_height = f4(1.0), above + f4(0.1) * look[4], f4(0.32) * look[4]
     edge = max(distance * _PIXEL, f4(0.01))
-    share = _within(aside, half_width, edge) * _within(above, half_height, edge)
+    fraction = _within(aside, half_width, edge) * _within(above, half_height, edge)
     bar = _within(aside, _MULLION_M, edge) * min(_MULLION_M / edge, f4(1.0))
-    return share * (f4(1.0) - bar), np.int64(bay) * 31 + np.int64(row) * 17
+    return fraction * (f4(1.0) - bar), np.int64(bay) * 31 + np.int64(row) * 17
 
 
 @inner_kernel

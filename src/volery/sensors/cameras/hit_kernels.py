@@ -12,7 +12,7 @@ from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, ORIGIN
 from volery.world.scene_kernels import RayBlock
 
 # Rows of `Scratch.hit`.
-HIT, PLACE_X, LIT, NORMAL_X, CLEARNESS, MIRRORED, _ROWS = 0, 1, 4, 5, 8, 9, 12
+HIT, POSITION_X, LIT, NORMAL_X, CLEARNESS, MIRRORED, _ROWS = 0, 1, 4, 5, 8, 9, 12
 
 f4 = np.float32
 
@@ -72,9 +72,9 @@ def note_hits(block: RayBlock, count: int, scratch: Scratch) -> None:
             scale = (f4(-1.0) if along > f4(0.0) else f4(1.0)) / size
             far = rays[FAR, k]
             hit[HIT, k] = f4(1.0) if instance[k] >= 0 else f4(0.0)
-            hit[PLACE_X, k] = rays[ORIGIN, k] + far * dx
-            hit[PLACE_X + 1, k] = rays[ORIGIN + 1, k] + far * dy
-            hit[PLACE_X + 2, k] = rays[ORIGIN + 2, k] + far * dz
+            hit[POSITION_X, k] = rays[ORIGIN, k] + far * dx
+            hit[POSITION_X + 1, k] = rays[ORIGIN + 1, k] + far * dy
+            hit[POSITION_X + 2, k] = rays[ORIGIN + 2, k] + far * dz
             hit[NORMAL_X, k] = nx * scale
             hit[NORMAL_X + 1, k] = ny * scale
             hit[NORMAL_X + 2, k] = nz * scale

@@ -65,8 +65,8 @@ def make_table(
     inside = (u < width) & (v < height)
     u, v = np.minimum(u, width - 1), np.minimum(v, height - 1)
     pixel = np.where(inside, v * width + u, -1)
-    places = np.stack([u, v], axis=-1)[:, :, None] + _OFFSETS[samples]
-    ideal = undistort((places - np.array(centre_px)) / focal_px, distortion)
+    samples_px = np.stack([u, v], axis=-1)[:, :, None] + _OFFSETS[samples]
+    ideal = undistort((samples_px - np.array(centre_px)) / focal_px, distortion)
     ideal = ideal.reshape(-1, LANES, 2)
     blind = np.isnan(ideal[..., 0]) | np.isnan(ideal[..., 1])
     ideal[blind] = 0.0
@@ -74,12 +74,12 @@ def make_table(
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     packets_of_tile = len(rays) // len(tile_y)
     middle = np.minimum(tile_y[:, 0] + (side - 1) / 2.0, height - 1)
-    share = middle / max(height - 1, 1)
+    fraction = middle / max(height - 1, 1)
     return PixelTable(
         np.ascontiguousarray(rays, dtype=np.float32),
         np.repeat(pixel, samples, axis=1).reshape(-1, LANES).astype(np.int64),
         blind,
-        np.repeat(np.round(share * readout_ns).astype(np.int64), packets_of_tile),
+        np.repeat(np.round(fraction * readout_ns).astype(np.int64), packets_of_tile),
         _cones(rays, readout_ns),
         samples,
     )

@@ -2,7 +2,7 @@
 
 Particles lie on a lattice that falls and drifts with the wind, one in each cell; position and size
 depend on the cell's numbers alone, so that all cameras see the same particles at any time. Numbers
-and sizes are those of `world.weather.particles`. Particles within `reach_m` and above `least_mm`
+and sizes are those of `world.weather.particles`. Particles within `max_range_m` and above `min_mm`
 are drawn; smaller or farther ones are part of the haze.
 """
 
@@ -27,8 +27,8 @@ from volery.world.weather.particles import (
     snow_slope,
 )
 
-_LEAST_MM = 0.5
-_RAIN_REACH_M, _SNOW_REACH_M = 5.0, 8.0
+_MIN_MM = 0.5
+_MAX_RAIN_RANGE_M, _MAX_SNOW_RANGE_M = 5.0, 8.0
 """Distances at which drops become too faint and flakes too small (modelling choices)."""
 _FLAKES_FALL_M_S = 1.0
 """Fall speed of aggregates of dry snow (Locatelli and Hobbs 1974: 0.8 to 1.4 m/s)."""
@@ -48,8 +48,8 @@ class Falling(NamedTuple):
     """(3,) m/s, map frame."""
     cell_m: float
     """Side of a cell, m."""
-    reach_m: float
-    least_mm: float
+    max_range_m: float
+    min_mm: float
     slope: float
     """Decay of the number of particles with the diameter, 1/mm."""
     colour: NDArray[np.float32]
@@ -64,14 +64,14 @@ def falling_in(weather: Weather, light: Light) -> tuple[Falling, ...]:
         slope = rain_slope(rain)
         number = number_per_mm(rain_extinction(rain), slope)
         colour = _DROP_TRANSMITS * 0.5 * (light.zenith + light.horizon)
-        speed = drop_speed(_LEAST_MM + 1.0 / slope)
-        found.append(_falling("rain", weather, speed, number, slope, _RAIN_REACH_M, colour))
+        speed = drop_speed(_MIN_MM + 1.0 / slope)
+        found.append(_falling("rain", weather, speed, number, slope, _MAX_RAIN_RANGE_M, colour))
     if snow > 0.0:
         slope = snow_slope(snow)
         number = number_per_mm(snow_extinction(snow, VISIBLE_NM), slope)
         colour = _FLAKE_REFLECTS * 0.5 * (light.overhead + light.bounce)
-        reach = _SNOW_REACH_M
-        found.append(_falling("snow", weather, _FLAKES_FALL_M_S, number, slope, reach, colour))
+        max_range = _MAX_SNOW_RANGE_M
+        found.append(_falling("snow", weather, _FLAKES_FALL_M_S, number, slope, max_range, colour))
     return tuple(found)
 
 
@@ -81,17 +81,17 @@ def _falling(
     speed: float,
     number: float,
     slope: float,
-    reach: float,
+    max_range: float,
     colour: NDArray[np.float32],
 ) -> Falling:
-    density = number / slope * math.exp(-slope * _LEAST_MM)
+    density = number / slope * math.exp(-slope * _MIN_MM)
     x, y, z = weather.velocity_map
     return Falling(
         key=stream_key(0, f"weather/{name}"),
         velocity=np.array([x, y, z - speed]),
         cell_m=max(density, 1e-9) ** (-1.0 / 3.0),
-        reach_m=reach,
-        least_mm=_LEAST_MM,
+        max_range_m=max_range,
+        min_mm=_MIN_MM,
         slope=slope,
         colour=np.asarray(colour, dtype=np.float32),
     )

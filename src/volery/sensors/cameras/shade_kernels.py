@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
-from volery.sensors.cameras.facade_kernels import pane_light, pane_share
+from volery.sensors.cameras.facade_kernels import pane_fraction, pane_light
 from volery.sensors.cameras.hit_kernels import (
     CLEARNESS,
     HIT,
     LIT,
     MIRRORED,
     NORMAL_X,
-    PLACE_X,
+    POSITION_X,
     Scratch,
 )
 from volery.sensors.cameras.light import CLEAR, GRAIN, Light
@@ -72,19 +72,19 @@ def _paint(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratc
                 _sky(light, direction, k, colour)
                 continue
             material, far = materials[k], distance[k]
-            x, y, z = hit[PLACE_X, k], hit[PLACE_X + 1, k], hit[PLACE_X + 2, k]
-            share = _texture(light, material, x, y, z, abs(hit[NORMAL_X + 2, k]) < f4(0.7))
+            x, y, z = hit[POSITION_X, k], hit[POSITION_X + 1, k], hit[POSITION_X + 2, k]
+            fraction = _texture(light, material, x, y, z, abs(hit[NORMAL_X + 2, k]) < f4(0.7))
             own_grey = light.grain[instances[k] & _MASK, np.int64(material) & _MASK]
             tint = f4(0.85) + f4(0.3) * own_grey
             for j in range(3):
                 first, second = light.surface[material, j], light.surface[material, 3 + j]
-                colour[j, k] = (first + share * (second - first)) * tint
+                colour[j, k] = (first + fraction * (second - first)) * tint
                 hit[MIRRORED + j, k] = f4(0.0)
             step: Any = np.int64(far * light.clear_per_m)
             hit[CLEARNESS, k] = light.clear[min(step, CLEAR - 1)]
             if material == _FACADE:
                 look, nx, ny = scene.look[instances[k]], hit[NORMAL_X, k], hit[NORMAL_X + 1, k]
-                glass, window = pane_share(look, x, y, z, nx, ny, far)
+                glass, window = pane_fraction(look, x, y, z, nx, ny, far)
                 for j in range(3):
                     colour[j, k] *= look[j] * (f4(1.0) - glass)
                     mirrored = pane_light(light, j, direction[2, k], window)

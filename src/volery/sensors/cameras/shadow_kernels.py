@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel
-from volery.sensors.cameras.hit_kernels import HIT, LIT, NORMAL_X, PLACE_X, Scratch
+from volery.sensors.cameras.hit_kernels import HIT, LIT, NORMAL_X, POSITION_X, Scratch
 from volery.sensors.cameras.light import Light
 from volery.world.body_kernels import body_sphere, hide_behind_body
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN, occluded_packet
@@ -14,7 +14,7 @@ from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 
 f4 = np.float32
 
-SHADOW_REACH_M = 80.0
+MAX_SHADOW_M = 80.0
 """Length of shadow rays, m: trees and houses are lower."""
 _SUN_ABOVE = 0.01
 """Margin by which the sine of the sun's elevation must exceed a slope (modelling choice)."""
@@ -48,9 +48,9 @@ def shading_bodies(
         x, y, z, radius = body_sphere(bodies, row)
         dx, dy, dz = x - cx, y - cy, z - cz
         along = dx * light.sun[0] + dy * light.sun[1] + dz * light.sun[2]
-        reach = ball + radius
+        radii = ball + radius
         aside = dx * dx + dy * dy + dz * dz - along * along
-        if row != uav and -reach < along < SHADOW_REACH_M + reach and aside < reach * reach:
+        if row != uav and -radii < along < MAX_SHADOW_M + radii and aside < radii * radii:
             near[found] = row
             found += 1
     return found
@@ -72,9 +72,9 @@ def _box(
         hit = scratch.hit[p]
         for j in range(3):
             for k in range(LANES):
-                met, place = hit[HIT, k] > f4(0.0), hit[PLACE_X + j, k]
-                low[j, k] = min(low[j, k], place if met else f4(np.inf))
-                high[j, k] = max(high[j, k], place if met else f4(-np.inf))
+                met, coordinate = hit[HIT, k] > f4(0.0), hit[POSITION_X + j, k]
+                low[j, k] = min(low[j, k], coordinate if met else f4(np.inf))
+                high[j, k] = max(high[j, k], coordinate if met else f4(-np.inf))
     for j in range(3):
         for k in range(1, LANES):
             low[j, 0], high[j, 0] = min(low[j, 0], low[j, k]), max(high[j, 0], high[j, k])
@@ -120,9 +120,9 @@ def _aim_at_sun(block: RayBlock, count: int, may_mix: bool, light: Light, scratc
             hit[LIT, k] = cosine
             # A step off the surface, on the side of the camera and the sun.
             off = f4(2e-3) + f4(1e-4) * distance[k]
-            rays[q, ORIGIN, lane] = hit[PLACE_X, k] + off * nx
-            rays[q, ORIGIN + 1, lane] = hit[PLACE_X + 1, k] + off * ny
-            rays[q, ORIGIN + 2, lane] = hit[PLACE_X + 2, k] + off * nz
+            rays[q, ORIGIN, lane] = hit[POSITION_X, k] + off * nx
+            rays[q, ORIGIN + 1, lane] = hit[POSITION_X + 1, k] + off * ny
+            rays[q, ORIGIN + 2, lane] = hit[POSITION_X + 2, k] + off * nz
             source[q, lane] = p * LANES + k
             lane += 1
             taken[q] = lane
@@ -154,7 +154,7 @@ def find_shadows(
         for k in range(LANES):
             valid[k] = -1 if k < lanes else 0
             rays[DIRECTION, k], rays[DIRECTION + 1, k], rays[DIRECTION + 2, k] = sx, sy, sz
-            rays[FAR, k] = f4(SHADOW_REACH_M)
+            rays[FAR, k] = f4(MAX_SHADOW_M)
         arguments = block.coherent.ctypes.data if run_together(block.rays, q, lanes) else 0
         occluded_packet(valid.ctypes.data, casters, rays.ctypes.data, arguments)
         for n in range(near_count):

@@ -25,8 +25,8 @@ _NEAREST_M = 0.3
 """Minimum distance, m; nearer particles are an invisible blur."""
 _FAINT = 3e-4
 """Fraction of a pixel's light below which nothing is drawn: the first byte above black."""
-_SHARE_BITS = np.uint64(16)
-_SHARE_MASK = np.uint64(0xFFFF)
+_FRACTION_BITS = np.uint64(16)
+_FRACTION_MASK = np.uint64(0xFFFF)
 _CELL_MASK = 0xFFFFFFFF
 
 f4 = np.float32
@@ -93,8 +93,8 @@ def _draw(
     quarter = 0.25 * np.pi
     # of the streak drawn below, including its soft edge, half a pixel wide
     area = drawn * length + quarter * drawn * drawn + np.pi / 12.0
-    share = min(quarter * width * width / area, 1.0)
-    if share < _FAINT:
+    fraction = min(quarter * width * width / area, 1.0)
+    if fraction < _FAINT:
         return
     step: Any = np.int64(ahead * light.clear_per_m)
     clear = light.clear[min(step, CLEAR - 1)]
@@ -110,7 +110,7 @@ def _draw(
             part = min(max((x * along + y * down) * inverse, 0.0), 1.0)
             x -= part * along
             y -= part * down
-            cover = share * min(half + 0.5 - np.sqrt(x * x + y * y), 1.0)
+            cover = fraction * min(half + 0.5 - np.sqrt(x * x + y * y), 1.0)
             pixel = row * view.width + column
             if cover < _FAINT or not depth[pixel] > ahead:
                 continue
@@ -123,10 +123,10 @@ def _draw(
 
 
 @inner_kernel
-def _box(view: WeatherView, frame: Frame, reach: float, j: int) -> tuple[float, float]:
-    """Returns the minimum and maximum of coordinate `j` in view up to `reach`, m, map frame."""
-    aside = view.across * reach * (abs(frame[6 + j]) + abs(frame[9 + j]))
-    far = frame[j] + reach * frame[3 + j]
+def _box(view: WeatherView, frame: Frame, max_range: float, j: int) -> tuple[float, float]:
+    """Returns the minimum and maximum of coordinate `j` in view up to `max_range`, m, map frame."""
+    aside = view.across * max_range * (abs(frame[6 + j]) + abs(frame[9 + j]))
+    far = frame[j] + max_range * frame[3 + j]
     return min(frame[j], far - aside), max(frame[j], far + aside)
 
 
@@ -145,9 +145,9 @@ def _draw_all(
     cell, v = particle.cell_m, particle.velocity
     sx, sy, sz = v[0] * 1e-9 * time_ns, v[1] * 1e-9 * time_ns, v[2] * 1e-9 * time_ns
     open_s = 1e-9 * view.exposure_ns
-    x0, x1 = _box(view, now, particle.reach_m, 0)
-    y0, y1 = _box(view, now, particle.reach_m, 1)
-    z0, z1 = _box(view, now, particle.reach_m, 2)
+    x0, x1 = _box(view, now, particle.max_range_m, 0)
+    y0, y1 = _box(view, now, particle.max_range_m, 1)
+    z0, z1 = _box(view, now, particle.max_range_m, 2)
     for i in range(int(np.floor((x0 - sx) / cell)), int(np.floor((x1 - sx) / cell)) + 1):
         plane = random_bits(particle.key, i & _CELL_MASK)
         for j in range(int(np.floor((y0 - sy) / cell)), int(np.floor((y1 - sy) / cell)) + 1):
@@ -155,22 +155,22 @@ def _draw_all(
             low = int(np.floor((z0 - sz) / cell))
             for k in range(low, int(np.floor((z1 - sz) / cell)) + 1):
                 bits = random_bits(column, k & _CELL_MASK)
-                x = (i + float(bits & _SHARE_MASK) / 65536.0) * cell + sx
-                bits >>= _SHARE_BITS
-                y = (j + float(bits & _SHARE_MASK) / 65536.0) * cell + sy
-                bits >>= _SHARE_BITS
-                z = (k + float(bits & _SHARE_MASK) / 65536.0) * cell + sz
-                bits >>= _SHARE_BITS
+                x = (i + float(bits & _FRACTION_MASK) / 65536.0) * cell + sx
+                bits >>= _FRACTION_BITS
+                y = (j + float(bits & _FRACTION_MASK) / 65536.0) * cell + sy
+                bits >>= _FRACTION_BITS
+                z = (k + float(bits & _FRACTION_MASK) / 65536.0) * cell + sz
+                bits >>= _FRACTION_BITS
                 end = _seen_at(view, now, x, y, z)
-                if end[2] < _NEAREST_M or end[2] > particle.reach_m:
+                if end[2] < _NEAREST_M or end[2] > particle.max_range_m:
                     continue
                 start = _seen_at(
                     view, before, x - open_s * v[0], y - open_s * v[1], z - open_s * v[2]
                 )
                 if start[2] <= 0.0:
                     continue
-                drawn = (float(bits & _SHARE_MASK) + 0.5) / 65536.0
-                diameter = particle.least_mm - np.log(drawn) / particle.slope
+                drawn = (float(bits & _FRACTION_MASK) + 0.5) / 65536.0
+                diameter = particle.min_mm - np.log(drawn) / particle.slope
                 _draw(view, light, particle, start, end, 1e-3 * diameter, depth, colour)
 
 

@@ -121,8 +121,8 @@ def _depths(particles: Particles) -> tuple[float, float]:
 
 def _tint(fog: float, dust: float) -> Array:
     """Returns the colour of scattered light, of brightness 1: grey but for the fraction of dust."""
-    share = dust / (fog + dust) if dust > 0.0 else 0.0
-    colour: Array = _mixed(_GREY, _DUSTY, share)
+    fraction = dust / (fog + dust) if dust > 0.0 else 0.0
+    colour: Array = _mixed(_GREY, _DUSTY, fraction)
     return colour / _brightness(colour)
 
 
@@ -130,8 +130,8 @@ def _brightness(colour: Array) -> float:
     return float(_LUMINANCE @ colour)
 
 
-def _mixed(a: Array, b: Array, share: float) -> Array:
-    return a + share * (b - a)
+def _mixed(a: Array, b: Array, fraction: float) -> Array:
+    return a + fraction * (b - a)
 
 
 def _wetted(surface: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -62,11 +62,11 @@ def sensor_frame(batch: RayBatch, scan: int, history: PoseHistory, time_ns: int)
     """Returns the sensor's origin (m) and its x, y and z axes in the map frame at a time."""
     # Scalars only: slices would change reference counts in memory that threads share.
     row = batch.mount[scan]
-    place, base, nods = batch.mounts
+    position, base, nods = batch.mounts
     x, y, z, px, py, pz, pw = pose_at(history, batch.uav[scan], time_ns)
     angle = nodding_angle(nods[row, 0], nods[row, 1], nods[row, 2], nods[row, 3], time_ns)
     qx, qy, qz, qw = nodded(base[row, 0], base[row, 1], base[row, 2], base[row, 3], angle)
-    mx, my, mz = rotate_vector(px, py, pz, pw, place[row, 0], place[row, 1], place[row, 2])
+    mx, my, mz = rotate_vector(px, py, pz, pw, position[row, 0], position[row, 1], position[row, 2])
     ax, ay, az, aw = quaternion_product(px, py, pz, pw, qx, qy, qz, qw)
     a, b, c = matrix_rows(ax, ay, az, aw)  # the columns are the sensor's axes
     return x + mx, y + my, z + mz, a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2]

@@ -15,7 +15,7 @@ from volery.core.plurals import counted
 from volery.core.text_tables import TextTable, number_in, plain_name, read_table, warn_of_unread
 
 _NEEDED = ("azimuth_deg", "elevation_deg", "time_s")
-_MOST_RINGS = 65535
+_MAX_RINGS = 65535
 
 
 class BeamList(NamedTuple):
@@ -29,12 +29,12 @@ class BeamList(NamedTuple):
     """(N,) ring number of each beam."""
 
 
-def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
+def read_beams(path: Path, longest_s: float, max_beams: int) -> BeamList:
     """Reads a table with the columns azimuth_deg, elevation_deg, time_s and optionally ring.
 
     `core.text_tables` reads it. Times must begin at 0 or later, never decrease and not exceed
-    `longest_s`; the file may have from 2 to `most` beams. Raises `DataFileError`, naming file, row
-    and allowed values, if the file violates this.
+    `longest_s`; the file may have from 2 to `max_beams` beams. Raises `DataFileError`, naming file,
+    row and allowed values, if the file violates this.
     """
     table = read_table(path, "beam table")
     names = [plain_name(name) for name in table.heading]
@@ -46,8 +46,8 @@ def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
     unread = (table.heading[k] for k, name in enumerate(names) if name and name not in known)
     warn_of_unread(f"beam table {path.name}", unread)
     rows = _rows_of(table, [names.index(name) for name in known if name in names], path)
-    if not 2 <= len(rows) <= most:
-        raise DataFileError(f"{path}: {counted(len(rows), 'beam')}; allowed are 2 to {most}")
+    if not 2 <= len(rows) <= max_beams:
+        raise DataFileError(f"{path}: {counted(len(rows), 'beam')}; allowed are 2 to {max_beams}")
     beams = np.array(rows)
     _check_times(beams[:, 2], longest_s, path)
     azimuth, elevation = np.radians(beams[:, 0]), np.radians(beams[:, 1])
@@ -72,10 +72,10 @@ def _rows_of(table: TextTable, columns: list[int], path: Path) -> list[list[floa
         azimuth, elevation, time_s, ring = (*numbers, math.nan)[:4]
         ring = 0.0 if math.isnan(ring) else ring
         is_valid = np.isfinite((azimuth, elevation, time_s)).all() and abs(elevation) <= 90.0
-        if not (is_valid and 0.0 <= ring <= _MOST_RINGS and ring.is_integer()):
+        if not (is_valid and 0.0 <= ring <= _MAX_RINGS and ring.is_integer()):
             raise DataFileError(
                 f"{path}: row {number}: numbers must be finite, elevation_deg within +-90, "
-                f"ring within 0..{_MOST_RINGS}"
+                f"ring within 0..{_MAX_RINGS}"
             )
         rows.append([azimuth, elevation, time_s, ring])
     return rows

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel
 from volery.core.rng import normal, uniform
 
-MOST_ECHOES = 3
+MAX_ECHOES = 3
 """Maximum echoes of a beam: its own surface and those beyond its two edges."""
 DRAWS = 4
 """Random numbers reserved per beam: range, dropout, edge, intensity."""
@@ -36,7 +36,7 @@ class LidarConstants(NamedTuple):
     dropout_grazing: float
     half_footprint: float
     """Half the beam's divergence over the angle between beams."""
-    least_jump: float
+    min_jump: float
     pulse_length: float
     first_echo_share: float
     warm_up_bias: float
@@ -90,10 +90,10 @@ def beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: f
     """
     if gap >= lidar.half_footprint:
         return distance
-    share = 0.5 * (1.0 - gap / lidar.half_footprint)
+    fraction = 0.5 * (1.0 - gap / lidar.half_footprint)
     if abs(neighbour - distance) < lidar.pulse_length:
-        return distance + share * (neighbour - distance)
-    if neighbour < distance and share >= lidar.first_echo_share:
+        return distance + fraction * (neighbour - distance)
+    if neighbour < distance and fraction >= lidar.first_echo_share:
         return neighbour
     return distance
 
@@ -102,7 +102,7 @@ def beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: f
 def is_edge(lidar: LidarConstants, a: float, b: float) -> bool:
     """Returns whether two neighbouring beams hit surfaces that do not continue each other."""
     gap = abs(a - b)  # inf or NaN where a beam hits nothing
-    return bool(lidar.least_jump < gap < np.inf)
+    return bool(lidar.min_jump < gap < np.inf)
 
 
 @inner_kernel

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from volery.sensors.lidar.echo_kernels import MOST_ECHOES, LidarConstants
+from volery.sensors.lidar.echo_kernels import MAX_ECHOES, LidarConstants
 from volery.sensors.lidar.scan_patterns import ScanPattern, TableScan
 from volery.sensors.model import SensorModel, find_model, read_model
 from volery.world.materials import REFLECTIVITY
@@ -95,7 +95,7 @@ class LidarModel(SensorModel):
     """A scanner; its data file names the sources of the numbers."""
 
     name: str
-    echoes: Annotated[int, Field(ge=1, le=MOST_ECHOES)] = 1
+    echoes: Annotated[int, Field(ge=1, le=MAX_ECHOES)] = 1
     """Maximum number of echoes per beam."""
     scan: ScanPattern
     range: RangeLimits
@@ -134,7 +134,7 @@ class LidarModel(SensorModel):
             dropout_far=self.dropout.far,
             dropout_grazing=self.dropout.grazing,
             half_footprint=0.5 * self.mixed_pixels.divergence_rad / self.scan.spacing_rad,
-            least_jump=self.mixed_pixels.least_jump_m,
+            min_jump=self.mixed_pixels.least_jump_m,
             pulse_length=self.mixed_pixels.pulse_length_m,
             first_echo_share=self.mixed_pixels.first_echo_share,
             warm_up_bias=self.warm_up.bias_m,

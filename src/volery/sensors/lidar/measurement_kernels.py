@@ -9,7 +9,7 @@ from volery.core.compiled import inner_kernel, kernel, owning_kernel
 from volery.core.rng import random_bits, uniform
 from volery.sensors.lidar.echo_kernels import (
     DRAWS,
-    MOST_ECHOES,
+    MAX_ECHOES,
     Echoes,
     LidarConstants,
     Surfaces,
@@ -67,7 +67,7 @@ def _measure_single(
 
 
 @inner_kernel
-def _shares(
+def _fractions(
     lidar: LidarConstants,
     key: np.uint64,
     counter: int,
@@ -89,30 +89,34 @@ def _shares(
 @inner_kernel
 def _merge(
     lidar: LidarConstants,
-    place: NDArray[np.float64],
-    share: NDArray[np.float64],
+    echo_distance: NDArray[np.float64],
+    fraction: NDArray[np.float64],
     source: NDArray[np.int64],
 ) -> int:
     """Sorts echoes by distance and merges those within a pulse length; returns the number left."""
-    for m in range(1, MOST_ECHOES):
+    for m in range(1, MAX_ECHOES):
         for n in range(m, 0, -1):
-            if place[n] < place[n - 1]:
-                place[n], place[n - 1] = place[n - 1], place[n]
-                share[n], share[n - 1] = share[n - 1], share[n]
+            if echo_distance[n] < echo_distance[n - 1]:
+                echo_distance[n], echo_distance[n - 1] = echo_distance[n - 1], echo_distance[n]
+                fraction[n], fraction[n - 1] = fraction[n - 1], fraction[n]
                 source[n], source[n - 1] = source[n - 1], source[n]
     count = 0
-    for m in range(MOST_ECHOES):
-        if share[m] <= 0.0:
+    for m in range(MAX_ECHOES):
+        if fraction[m] <= 0.0:
             continue
         last = count - 1
-        if count > 0 and place[m] - place[last] < lidar.pulse_length:
-            total = share[last] + share[m]
-            place[last] += share[m] / total * (place[m] - place[last])
-            if share[m] > share[last]:
+        if count > 0 and echo_distance[m] - echo_distance[last] < lidar.pulse_length:
+            total = fraction[last] + fraction[m]
+            echo_distance[last] += fraction[m] / total * (echo_distance[m] - echo_distance[last])
+            if fraction[m] > fraction[last]:
                 source[last] = source[m]
-            share[last] = total
+            fraction[last] = total
         else:
-            place[count], share[count], source[count] = place[m], share[m], source[m]
+            echo_distance[count], fraction[count], source[count] = (
+                echo_distance[m],
+                fraction[m],
+                source[m],
+            )
             count += 1
     return count
 
@@ -134,9 +138,9 @@ def _measure_several(
     A footprint that extends beyond an edge returns an echo from either side, each with its fraction
     of the light. Echoes within a pulse length merge; those with too small a fraction are lost.
     """
-    beams, stride, most = distance.shape[0], lidar.stride, ranges.shape[0]
-    place, share = np.empty(MOST_ECHOES), np.empty(MOST_ECHOES)
-    source = np.empty(MOST_ECHOES, np.int64)
+    beams, stride, num_echoes = distance.shape[0], lidar.stride, ranges.shape[0]
+    echo_distance, fraction = np.empty(MAX_ECHOES), np.empty(MAX_ECHOES)
+    source = np.empty(MAX_ECHOES, np.int64)
     for i in range(beams):
         ranges[:, i] = np.inf
         intensities[:, i] = 0.0
@@ -149,18 +153,18 @@ def _measure_several(
         counter = (scan_number * beams + i) * DRAWS
         after = before = 0.0
         if lidar.noise:
-            after, before = _shares(lidar, key, counter, i, distance)
-        place[0], share[0], source[0] = true, 1.0 - after - before, i
-        place[1], share[1], source[1] = np.inf, after, i + stride
-        place[2], share[2], source[2] = np.inf, before, i - stride
-        for m in range(1, MOST_ECHOES):
-            if share[m] > 0.0:
-                place[m] = distance[source[m]]
+            after, before = _fractions(lidar, key, counter, i, distance)
+        echo_distance[0], fraction[0], source[0] = true, 1.0 - after - before, i
+        echo_distance[1], fraction[1], source[1] = np.inf, after, i + stride
+        echo_distance[2], fraction[2], source[2] = np.inf, before, i - stride
+        for m in range(1, MAX_ECHOES):
+            if fraction[m] > 0.0:
+                echo_distance[m] = distance[source[m]]
         found = 0
-        for m in range(_merge(lidar, place, share, source)):
-            if share[m] < lidar.first_echo_share or found == most:
+        for m in range(_merge(lidar, echo_distance, fraction, source)):
+            if fraction[m] < lidar.first_echo_share or found == num_echoes:
                 continue
-            j, r, own = source[m], place[m], key
+            j, r, own = source[m], echo_distance[m], key
             if m > 0:
                 own = random_bits(key, _FIRST_ECHO_STREAM + m)
             if lidar.noise:
@@ -169,8 +173,10 @@ def _measure_several(
                 continue
             ranges[found, i] = r
             if intensities.shape[0] > 0:
-                value = echo_intensity(lidar, place[m], cosine[j], material[j], own, counter)
-                intensities[found, i] = share[m] * value
+                value = echo_intensity(
+                    lidar, echo_distance[m], cosine[j], material[j], own, counter
+                )
+                intensities[found, i] = fraction[m] * value
             found += 1
 
 

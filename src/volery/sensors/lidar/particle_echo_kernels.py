@@ -13,12 +13,12 @@ from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import normal, random_bits, uniform
 from volery.core.workers import fetch_add
 from volery.sensors.lidar.aim_kernels import RayBatch
-from volery.sensors.lidar.echo_kernels import MOST_ECHOES, Echoes, LidarConstants
+from volery.sensors.lidar.echo_kernels import MAX_ECHOES, Echoes, LidarConstants
 from volery.sensors.lidar.particle_echoes import KINDS, VOLUME, ParticleTable
 
 _STREAM = 1 << 61
 """Number of the draw of a scan's stream whose value is the key of its particles."""
-_DRAWS = MOST_ECHOES + 3 * KINDS
+_DRAWS = MAX_ECHOES + 3 * KINDS
 """Draws per beam: survival of each echo; position, strength and noise of each kind's false one."""
 
 
@@ -57,7 +57,7 @@ def _weaken(
 
 
 @inner_kernel
-def _place_of(table: NDArray[np.float64], events: float) -> float:
+def _table_index(table: NDArray[np.float64], events: float) -> float:
     """Returns the fractional index at which an ascending table reaches `events`."""
     low, high = 0, table.shape[0] - 1
     while high - low > 1:
@@ -70,9 +70,9 @@ def _place_of(table: NDArray[np.float64], events: float) -> float:
 
 
 @inner_kernel
-def _between(values: NDArray[np.float64], place: float) -> float:
-    low = min(int(place), values.shape[0] - 2)
-    f = place - low
+def _between(values: NDArray[np.float64], index: float) -> float:
+    low = min(int(index), values.shape[0] - 2)
+    f = index - low
     return float((1.0 - f) * values[low] + f * values[low + 1])
 
 
@@ -119,15 +119,15 @@ def _see_particles(
         alike = first * np.exp(air.extinction * first)
         behind = (lidar.range_max / alike) ** 2
     for kind in range(KINDS):
-        draw = counter + MOST_ECHOES + 3 * kind
+        draw = counter + MAX_ECHOES + 3 * kind
         drawn = uniform(key, draw)
         if drawn <= air.never[kind]:
             continue
-        place = _place_of(air.events[kind], -np.log(drawn))
-        r = _between(air.range, place)
+        index = _table_index(air.events[kind], -np.log(drawn))
+        r = _between(air.range, index)
         if r > surface - lidar.pulse_length:
             continue
-        strength = 1.0 - _between(air.spread[kind], place) * np.log(uniform(key, draw + 1))
+        strength = 1.0 - _between(air.spread[kind], index) * np.log(uniform(key, draw + 1))
         if kind != VOLUME:
             strength *= strength
         if strength < lidar.first_echo_share * (strength + behind):

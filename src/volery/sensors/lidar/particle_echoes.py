@@ -90,8 +90,8 @@ class ParticleTable(NamedTuple):
 def particle_table(model: LidarModel, particles: Particles) -> ParticleTable:
     """Returns the effect of particles on a LIDAR; `particles` must not be clear air."""
     whole = extinction(particles, WAVELENGTH_NM)
-    reach = reach_m(model.range.max_m, whole)
-    ranges = np.geomspace(max(model.range.min_m, 0.01), reach, _STEPS)
+    max_range = max_range_m(model.range.max_m, whole)
+    ranges = np.geomspace(max(model.range.min_m, 0.01), max_range, _STEPS)
     rates, spread = np.zeros((KINDS, _STEPS)), np.zeros((KINDS, _STEPS))
     if particles.rain_mm_h > 0.0:
         slope = rain_slope(particles.rain_mm_h)
@@ -110,7 +110,7 @@ def particle_table(model: LidarModel, particles: Particles) -> ParticleTable:
     return ParticleTable(whole, ranges, events, np.exp(-events[:, -1]), spread, scale)
 
 
-def reach_m(clear_m: float, extinction_per_m: float) -> float:
+def max_range_m(clear_m: float, extinction_per_m: float) -> float:
     """Returns the range r, m, with r exp(a r) = clear_m, beyond which nothing is detected."""
     r = clear_m / (1.0 + extinction_per_m * clear_m)
     for _ in range(50):  # Newton's method for log r + a r, which is concave: it does not overshoot
@@ -125,15 +125,15 @@ def backscatter_per_m(particles: Particles) -> float:
 
 
 def _grains(
-    model: LidarModel, r: Array, whole: float, number: float, slope: float, share: float
+    model: LidarModel, r: Array, whole: float, number: float, slope: float, fraction: float
 ) -> tuple[Array, Array]:
     """Returns detected grains per metre and the spread of their strengths at ranges `r`."""
     sight = model.particles
     width = sight.beam_diameter_m + model.mixed_pixels.divergence_rad * r
-    factor = math.sqrt(sight.threshold_reflectivity / (4.0 * share)) / model.range.max_m
-    least = 1e3 * factor * width * (r + sight.overlap_m) * np.exp(whole * r)  # mm
-    rates = math.pi / 4.0 * width**2 * number / slope * np.exp(-slope * least)
-    return rates, 1.0 / (slope * least)
+    factor = math.sqrt(sight.threshold_reflectivity / (4.0 * fraction)) / model.range.max_m
+    min_mm = 1e3 * factor * width * (r + sight.overlap_m) * np.exp(whole * r)  # mm
+    rates = math.pi / 4.0 * width**2 * number / slope * np.exp(-slope * min_mm)
+    return rates, 1.0 / (slope * min_mm)
 
 
 def _volume(model: LidarModel, r: Array, whole: float, backscatter: float) -> tuple[Array, Array]:

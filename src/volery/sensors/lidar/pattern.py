@@ -14,7 +14,7 @@ from volery.sensors.lidar.beam_table import BeamTable, block_table, in_packets
 from volery.sensors.model import SensorModel
 from volery.world.embree import LANES
 
-MOST_BEAMS = 1 << 20
+MAX_BEAMS = 1 << 20
 """Maximum number of beams of a sweep."""
 
 

@@ -21,7 +21,7 @@ from volery.core.errors import DataFileError
 from volery.scenario.access import ScenarioAccess
 from volery.sensors.lidar.beam_file import BeamList, read_beams
 from volery.sensors.lidar.beam_table import BeamTable, block_table, row_table
-from volery.sensors.lidar.pattern import MOST_BEAMS, Pattern, median_spacing
+from volery.sensors.lidar.pattern import MAX_BEAMS, Pattern, median_spacing
 from volery.world.embree import LANES
 
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -33,7 +33,7 @@ class PlanarScan(Pattern):
     """Evenly spaced beams in the sensor's x-y plane."""
 
     kind: Literal["planar"]
-    beams: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
+    beams: Annotated[int, Field(ge=2, le=MAX_BEAMS)]
     angle_min_rad: float
     angle_max_rad: float
     sweep_duration_s: PositiveFloat
@@ -91,7 +91,7 @@ class RingScan(Pattern):
     """
 
     kind: Literal["rings"]
-    columns: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
+    columns: Annotated[int, Field(ge=2, le=MAX_BEAMS)]
     column_period_s: PositiveFloat
     azimuth_start_deg: Degrees = 0.0
     """Azimuth of the head at the first column."""
@@ -113,8 +113,8 @@ class RingScan(Pattern):
         for name in ("azimuth_offset_deg", "firing_offset_s"):
             if len(getattr(self, name)) not in {0, rings}:
                 raise ValueError(f"{name} must have one entry per ring ({rings}), or none")
-        if rings * self.columns > MOST_BEAMS:
-            raise ValueError(f"rings times columns must be at most {MOST_BEAMS}")
+        if rings * self.columns > MAX_BEAMS:
+            raise ValueError(f"rings times columns must be at most {MAX_BEAMS}")
         if self.azimuth_step_deg == 0.0:
             raise ValueError("azimuth_step_deg must not be 0")
         if self.sweep_ns > NS_PER_S / self.rate_hz:
@@ -174,7 +174,7 @@ class RosetteScan(Pattern):
     """
 
     kind: Literal["rosette"]
-    points: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
+    points: Annotated[int, Field(ge=2, le=MAX_BEAMS)]
     point_period_s: PositiveFloat
     prism_rpm: tuple[float, float]
     """Speed of each prism; positive turns from y to z."""
@@ -242,7 +242,7 @@ class TableScan(Pattern):
                 f"{self._folder / self.file}: cannot be read; a beam table lies in the folder of "
                 "its model file or below it"
             ) from None
-        return read_beams(path, 1.0 / self.rate_hz, MOST_BEAMS)
+        return read_beams(path, 1.0 / self.rate_hz, MAX_BEAMS)
 
     @cached_property
     def spacing_rad(self) -> float:

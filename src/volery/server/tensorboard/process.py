@@ -21,7 +21,7 @@ PREFIX = "/tensorboard"
 _STARTING_S = 120.0
 """Timeout of the start; it takes seconds, on a busy machine longer."""
 _ENDING_S = 5.0
-_LINES_TOLD = 5
+_NUM_ERROR_LINES = 5
 _URL = re.compile(rf"http://127\.0\.0\.1:(\d+){PREFIX}/")
 _SECRETS = ("VOLERY_TOKEN", "VOLERY_VIEWER_TOKEN")
 
@@ -52,7 +52,7 @@ class TensorBoardProcess:
         self._starting_s = starting_s
         self._process: subprocess.Popen[str] | None = None
         self._reader = threading.Thread()
-        self._lines: deque[str] = deque(maxlen=_LINES_TOLD)
+        self._lines: deque[str] = deque(maxlen=_NUM_ERROR_LINES)
         self._listening = threading.Event()
         self._port: int | None = None
 

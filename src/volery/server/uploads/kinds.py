@@ -16,7 +16,7 @@ class Kind(NamedTuple):
     """One kind of upload. The readers of such files have limits of their own."""
 
     suffixes: tuple[str, ...]
-    most_bytes: int
+    max_bytes: int
     what: str
 
 
@@ -39,26 +39,26 @@ KINDS = {
     "forest": Kind((".csv",), 8_000_000, "trees: x_m, y_m[, dbh_cm, height_m, species]"),
     SCENARIO: Kind((".toml",), 256_000, "a scenario"),
 }
-MOST_UPLOADS = 200
+MAX_UPLOADS = 200
 """Max number of scenarios in the folder."""
 MAX_UAVS = 1_000
 """Max number in a scenario."""
-MOST_CELLS = 1_000_000
-MOST_TREES = 50_000
-MOST_CORNERS = 100_000
+MAX_CELLS = 1_000_000
+MAX_TREES = 50_000
+MAX_CORNERS = 100_000
 """Max number of corners of outlines."""
-MOST_CROWDING = 10_000_000
+MAX_CROWDING = 10_000_000
 """Max sum of the squares of the numbers of walls in all squares of 16 m, half a street's width.
 
 The time to find streets grows with it, up to about 12 s. Of the 559 outlines of central Helsinki it
 is below 100,000.
 """
-MOST_WALLS_M = 16_000_000.0
+MAX_WALLS_M = 16_000_000.0
 """Max length of all walls."""
-MOST_OVERLAPS = 200_000
+MAX_OVERLAPS = 200_000
 """Max number of pairs of outlines whose bounding boxes overlap."""
-MOST_TRIANGLES = 2_000_000
-FARTHEST_M = 5_000.0
+MAX_TRIANGLES = 2_000_000
+MAX_DISTANCE_M = 5_000.0
 """Max distance from the map's origin."""
 
 

@@ -25,15 +25,15 @@ from volery.server.server_state import ServerState
 from volery.server.uploads.kinds import (
     BOUNDS,
     MAP_SERVER,
-    MOST_UPLOADS,
+    MAX_UPLOADS,
     image_suffix_of,
     kind_of_upload,
     suffix_of,
 )
 
-_MOST_CHARACTERS = 30
+_MAX_CHARACTERS = 30
 """Max length of a scenario's name, before its number."""
-_MOST_WORDS = 600
+_MAX_WORDS = 600
 """Max length of a message, characters."""
 
 
@@ -46,20 +46,20 @@ async def upload(request: Request) -> Response:
     called = plain(request.query_params.get("name", "")[:200])
     suffix = suffix_of(called, kind)
     image = image_suffix_of(request.query_params.get("image", "")) if suffix == MAP_SERVER else ""
-    folder = site.shelf.folder
+    folder = site.catalog.folder
     if folder is None:
         raise RefusedError(409, "this server accepts no uploads; start it with `volery serve`")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
         path = Path(made) / f"{kind_name}{suffix}"
-        await save_body(request, path, kind.most_bytes)
+        await save_body(request, path, kind.max_bytes)
         if image:
             _split(path, request.query_params.get("head", ""), path.with_suffix(image))
         lock: asyncio.Lock = request.app.state.upload_lock
         async with lock:  # one at a time
-            if len(site.shelf.added()) >= MOST_UPLOADS:
-                raise RefusedError(507, f"there are {MOST_UPLOADS} uploads already; remove some")
-            name = name_for(called, site.shelf)
+            if len(site.catalog.added()) >= MAX_UPLOADS:
+                raise RefusedError(507, f"there are {MAX_UPLOADS} uploads already; remove some")
+            name = name_for(called, site.catalog)
             await asyncio.to_thread(_check, kind_name, path, name, called)
             await asyncio.to_thread(shutil.copytree, made, folder / name)
     return JSONResponse({"scenario": name}, 201)
@@ -78,22 +78,22 @@ def _split(path: Path, head: str, image: Path) -> None:
     image.write_bytes(data[size:])
 
 
-def name_for(called: str, shelf: ScenarioCatalog) -> str:
+def name_for(called: str, catalog: ScenarioCatalog) -> str:
     """Returns a free scenario name similar to the client's file name."""
     stem = PurePosixPath(called.replace("\\", "/")).stem.lower()
     words = re.sub(r"[^a-z0-9]+", "_", stem).strip("_")
-    base = re.sub(r"^[^a-z]*", "", words)[:_MOST_CHARACTERS].strip("_") or "upload"
-    taken = {*library.names(), *shelf.added()}
-    names = (base if number == 1 else f"{base}_{number}" for number in range(1, MOST_UPLOADS + 100))
+    base = re.sub(r"^[^a-z]*", "", words)[:_MAX_CHARACTERS].strip("_") or "upload"
+    taken = {*library.names(), *catalog.added()}
+    names = (base if number == 1 else f"{base}_{number}" for number in range(1, MAX_UPLOADS + 100))
     return next(name for name in names if name not in taken)
 
 
 def _check(kind: str, path: Path, name: str, called: str) -> None:
     """Builds the world in a separate process. Raises RefusedError with the file's problem."""
     try:
-        told = run_bounded(f"{__package__}.validation", (kind, str(path), name, called), BOUNDS)
+        result = run_bounded(f"{__package__}.validation", (kind, str(path), name, called), BOUNDS)
     except BoundedError as error:
         raise RefusedError(422, str(error)) from None
-    if "error" in told:
-        plain = str(told["error"]).replace(str(path), called).replace(str(path.parent), "")
-        raise RefusedError(422, plain[:_MOST_WORDS])
+    if "error" in result:
+        plain = str(result["error"]).replace(str(path), called).replace(str(path.parent), "")
+        raise RefusedError(422, plain[:_MAX_WORDS])

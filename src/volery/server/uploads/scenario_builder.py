@@ -18,16 +18,16 @@ from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
 from volery.server.uploads.kinds import (
-    FARTHEST_M,
     IMAGES,
     MAP_SERVER,
-    MOST_CELLS,
-    MOST_CORNERS,
-    MOST_CROWDING,
-    MOST_OVERLAPS,
-    MOST_TREES,
-    MOST_TRIANGLES,
-    MOST_WALLS_M,
+    MAX_CELLS,
+    MAX_CORNERS,
+    MAX_CROWDING,
+    MAX_DISTANCE_M,
+    MAX_OVERLAPS,
+    MAX_TREES,
+    MAX_TRIANGLES,
+    MAX_WALLS_M,
 )
 from volery.world.city.geojson import read_features
 from volery.world.city.selection import select_buildings
@@ -43,8 +43,8 @@ flight.
 _MARGIN_M = 30.0
 """Margin of ground around the obstacles."""
 _BESIDE_M = 5.0
-_LEAST_EXTENT_M = 150.0
-_CITY_REACH_M = 2_000.0
+_MIN_EXTENT_M = 150.0
+_CITY_HALF_WIDTH_M = 2_000.0
 """Half the side of the part of a city that is used."""
 _NEAR_M = 16.0
 _ROWS = 64
@@ -70,12 +70,12 @@ def toml_of(kind: str, path: Path, name: str, called: str) -> str:
     read, or is too large to show in a browser.
     """
     part = _MAKERS[kind](path)
-    if not part.extent_m <= FARTHEST_M:
+    if not part.extent_m <= MAX_DISTANCE_M:
         raise DataFileError(
-            f"{path} reaches {part.extent_m:.0f} m from the origin; at most {FARTHEST_M:.0f} m are "
-            "allowed: are its coordinates metres from a nearby origin?"
+            f"{path} reaches {part.extent_m:.0f} m from the origin; at most {MAX_DISTANCE_M:.0f} m "
+            "are allowed: are its coordinates metres from a nearby origin?"
         )
-    extent = max(_LEAST_EXTENT_M, math.ceil(part.extent_m + _MARGIN_M))
+    extent = max(_MIN_EXTENT_M, math.ceil(part.extent_m + _MARGIN_M))
     shown = "".join(c if c.isascii() and c.isprintable() else "?" for c in called)[:80]
     template = Path(__file__).with_name("scenario_template.txt").read_text(encoding="utf-8")
     return template.format(
@@ -133,27 +133,27 @@ def _city(path: Path) -> _Part:
     longitude, latitude = ((corners.min(axis=0) + corners.max(axis=0)) / 2.0).tolist()
     frame = LocalFrame.from_degrees(latitude, longitude, 0.0)
     radians = np.radians(corners[:, ::-1])
-    places = frame.enu_from_geodetic(np.pad(radians, ((0, 0), (0, 1))))
+    positions = frame.enu_from_geodetic(np.pad(radians, ((0, 0), (0, 1))))
     ends = np.cumsum([len(ring) for ring in rings])[:-1]
-    _check_outlines(path, [ring for ring in np.split(places[:, :2], ends) if len(ring)])
-    reach = min(float(np.abs(places[:, :2]).max()) + 1.0, _CITY_REACH_M)
+    _check_outlines(path, [ring for ring in np.split(positions[:, :2], ends) if len(ring)])
+    half_width_m = min(float(np.abs(positions[:, :2]).max()) + 1.0, _CITY_HALF_WIDTH_M)
     world = (
         f"[world.origin]\nlatitude_deg = {latitude!r}\nlongitude_deg = {longitude!r}\n"
         f"altitude_m = 0.0\n[world.city]\nfile = {json.dumps(path.name)}\n"
-        f"region_m = {_numbers((-reach, -reach, reach, reach))}\n"
+        f"region_m = {_numbers((-half_width_m, -half_width_m, half_width_m, half_width_m))}\n"
     )
-    return _Part(world, reach + _MARGIN_M, (0.0, 0.0), (5.0, 0.0))
+    return _Part(world, half_width_m + _MARGIN_M, (0.0, 0.0), (5.0, 0.0))
 
 
 def _check_outlines(path: Path, rings: list[Array]) -> None:
     """Raises DataFileError for outlines, as rings (n, 2) in m, that would take minutes to build."""
     low = np.array([ring.min(axis=0) for ring in rings])
     high = np.array([ring.max(axis=0) for ring in rings])
-    used = (np.abs(low + high) / 2.0 <= _CITY_REACH_M).all(axis=1)
+    used = (np.abs(low + high) / 2.0 <= _CITY_HALF_WIDTH_M).all(axis=1)
     rings = [ring for ring, is_used in zip(rings, used.tolist(), strict=True) if is_used]
     count = sum(len(ring) for ring in rings)
-    if count > MOST_CORNERS:
-        raise DataFileError(f"{path}: {count} corners; at most {MOST_CORNERS} are allowed")
+    if count > MAX_CORNERS:
+        raise DataFileError(f"{path}: {count} corners; at most {MAX_CORNERS} are allowed")
     if rings:
         _check_walls(path, rings)
         _check_overlaps(path, low[used], high[used])
@@ -162,17 +162,17 @@ def _check_outlines(path: Path, rings: list[Array]) -> None:
 def _check_walls(path: Path, rings: list[Array]) -> None:
     """Raises DataFileError for walls that are too long, or too many in one place."""
     start = np.concatenate([ring[:-1] for ring in rings])
-    way = np.concatenate([np.diff(ring, axis=0) for ring in rings])
-    length = np.hypot(way[:, 0], way[:, 1])
-    if length.sum() > MOST_WALLS_M:
+    vectors = np.concatenate([np.diff(ring, axis=0) for ring in rings])
+    length = np.hypot(vectors[:, 0], vectors[:, 1])
+    if length.sum() > MAX_WALLS_M:
         raise DataFileError(f"{path}: its walls are too long: {length.sum() / 1000.0:.0f} km")
     pieces = np.maximum(np.ceil(2.0 * length / _NEAR_M), 1.0).astype(np.int64)
     wall = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(wall)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    middle = start[wall] + way[wall] * ((number + 0.5) / pieces[wall])[:, None]
+    middle = start[wall] + vectors[wall] * ((number + 0.5) / pieces[wall])[:, None]
     cell = np.floor(middle / _NEAR_M).astype(np.int64)
     _, there = np.unique(cell[:, 0] * (1 << 32) + cell[:, 1], return_counts=True)
-    if float((there.astype(np.float64) ** 2).sum()) > MOST_CROWDING:
+    if float((there.astype(np.float64) ** 2).sum()) > MAX_CROWDING:
         raise DataFileError(f"{path}: its walls are too dense: simplify the outlines")
 
 
@@ -183,38 +183,38 @@ def _check_overlaps(path: Path, low: Array, high: Array) -> None:
         rows = slice(first, first + _ROWS)
         apart = (low[rows, None] > high[None]) | (low[None] > high[rows, None])
         overlaps += int((~apart.any(axis=2)).sum())
-        if overlaps - len(low) > 2 * MOST_OVERLAPS:
-            raise DataFileError(f"{path}: more than {MOST_OVERLAPS} pairs of outlines overlap")
+        if overlaps - len(low) > 2 * MAX_OVERLAPS:
+            raise DataFileError(f"{path}: more than {MAX_OVERLAPS} pairs of outlines overlap")
 
 
 def _mesh(path: Path) -> _Part:
     file = read_mesh(path)
     count = len(file.triangles)
-    if count > MOST_TRIANGLES:
-        raise DataFileError(f"{path}: {count} triangles; at most {MOST_TRIANGLES} are allowed")
+    if count > MAX_TRIANGLES:
+        raise DataFileError(f"{path}: {count} triangles; at most {MAX_TRIANGLES} are allowed")
     low, high = file.points.min(axis=0), file.points.max(axis=0)
     middle = (low + high) / 2.0
-    place = (-float(middle[0]), -float(middle[1]), -float(low[2]))
+    position = (-float(middle[0]), -float(middle[1]), -float(low[2]))
     half = float((high - low)[:2].max()) / 2.0
     world = (
         f'[[world.meshes]]\nfile = {json.dumps(path.name)}\nname = "uploaded"\n'
-        f"position_m = {_numbers(place)}\n"
+        f"position_m = {_numbers(position)}\n"
     )
     return _Part(world, half, *_beside(-half))
 
 
 def _forest(path: Path) -> _Part:
     inventory = read_inventory(path)
-    if not 0 < len(inventory) <= MOST_TREES:
+    if not 0 < len(inventory) <= MAX_TREES:
         raise DataFileError(
-            f"{path}: {counted(len(inventory), 'tree')}; allowed are 1 to {MOST_TREES}"
+            f"{path}: {counted(len(inventory), 'tree')}; allowed are 1 to {MAX_TREES}"
         )
     low, high = inventory.position.min(axis=0), inventory.position.max(axis=0)
     world = (
         f'[world.forest]\nkind = "inventory"\nfile = {json.dumps(path.name)}\n'
         'species = "broadleaf"\n'
     )
-    if float(np.abs([low, high]).max()) > FARTHEST_M:  # projected coordinates
+    if float(np.abs([low, high]).max()) > MAX_DISTANCE_M:  # projected coordinates
         middle = np.round((low + high) / 2.0)
         low, high = low - middle, high - middle
         world += f"position_m = {_numbers((-float(middle[0]), -float(middle[1])))}\n"
@@ -224,8 +224,8 @@ def _forest(path: Path) -> _Part:
 
 
 def _check_cells(path: Path, rows: int, columns: int) -> None:
-    if rows * columns > MOST_CELLS:
-        raise DataFileError(f"{path}: {columns} x {rows} cells; at most {MOST_CELLS} are allowed")
+    if rows * columns > MAX_CELLS:
+        raise DataFileError(f"{path}: {columns} x {rows} cells; at most {MAX_CELLS} are allowed")
 
 
 def _beside(x: float, y: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -24,7 +24,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
     Raises VoleryError if the file is invalid, or there is no room for a UAV.
     """
-    from volery.runtime.construction.fleet import check_types, place
+    from volery.runtime.construction.fleet import check_types, place_fleet
     from volery.runtime.construction.worlds import (
         build_city,
         build_forest,
@@ -47,7 +47,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
     forest = build_forest(scenario, terrain, city)
     scene = build_scene(scenario, terrain, forest, city)
     try:
-        place(scenario, scene, terrain)
+        place_fleet(scenario, scene, terrain)
     finally:
         scene.close()
 
@@ -55,14 +55,14 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 def main(kind: str, file: str, name: str, called: str) -> None:
     """Checks a file and prints the result."""
     bound_this_process(BOUNDS)
-    told: dict[str, str] = {}
+    result: dict[str, str] = {}
     try:
         check(kind, Path(file), name, called)
     except VoleryError as error:
-        told["error"] = str(error)
+        result["error"] = str(error)
     except MemoryError:
-        told["error"] = f"{file} needs more than {BOUNDS.memory_bytes >> 30} GB of memory"
-    sys.stdout.write(json.dumps(told))
+        result["error"] = f"{file} needs more than {BOUNDS.memory_bytes >> 30} GB of memory"
+    sys.stdout.write(json.dumps(result))
 
 
 if __name__ == "__main__":

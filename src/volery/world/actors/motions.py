@@ -58,45 +58,51 @@ class WaypointMotion:
         self._points: list[tuple[float, ...]] = [
             tuple(point) for point in points[np.append(True, moves)].tolist()
         ]
-        self._way: list[float] = [0.0, *np.cumsum(length[moves]).tolist()]
+        self._along: list[float] = [0.0, *np.cumsum(length[moves]).tolist()]
         """Distance of each point along the path, m."""
         self._at_end = at_end
         self._start_s = start_s
-        self._turn_m = min(turn_m, 0.25 * self._way[-1])
+        self._turn_m = min(turn_m, 0.25 * self._along[-1])
         self._ground = ground
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
         """Returns the pose (7,) at a time; see `ActorMotion`."""
-        way = self.speed_m_s * max(time_s - self._start_s, 0.0)
+        distance = self.speed_m_s * max(time_s - self._start_s, 0.0)
         if self._at_end == "stop":
-            way = min(way, self._way[-1])
-        x, y, *rest = self._place(way)
+            distance = min(distance, self._along[-1])
+        x, y, *rest = self._position_at(distance)
         z = rest[0] if self._ground is None else self._ground(x, y)
-        half = 0.5 * self._heading(way)
+        half = 0.5 * self._heading(distance)
         return np.array([x, y, z, 0.0, 0.0, math.sin(half), math.cos(half)])
 
-    def _heading(self, way: float) -> float:
-        ahead, behind = self._place(way + self._turn_m), self._place(way - self._turn_m)
+    def _heading(self, distance: float) -> float:
+        ahead, behind = (
+            self._position_at(distance + self._turn_m),
+            self._position_at(distance - self._turn_m),
+        )
         dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         if math.hypot(dx, dy) < 1e-9:  # exactly at a reversal, or vertical
-            ahead, behind = self._place(way + 2e-3 * self._turn_m), self._place(way)
+            ahead, behind = (
+                self._position_at(distance + 2e-3 * self._turn_m),
+                self._position_at(distance),
+            )
             dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         return math.atan2(dy, dx)
 
-    def _place(self, way: float) -> list[float]:
-        """Returns the position after `way` m, with a waypoint's dimension, within the path."""
-        length = self._way[-1]
+    def _position_at(self, distance: float) -> list[float]:
+        """Returns the position after `distance` m, with a waypoint's dimension, within the path."""
+        length = self._along[-1]
         if self._at_end == "loop":
-            way %= length
+            distance %= length
         elif self._at_end == "back":
-            way %= 2.0 * length
-            way = min(way, 2.0 * length - way)
-        way = min(max(way, 0.0), length)
-        k = min(bisect.bisect_right(self._way, way), len(self._way) - 1)
-        share = (way - self._way[k - 1]) / (self._way[k] - self._way[k - 1])
+            distance %= 2.0 * length
+            distance = min(distance, 2.0 * length - distance)
+        distance = min(max(distance, 0.0), length)
+        k = min(bisect.bisect_right(self._along, distance), len(self._along) - 1)
+        fraction = (distance - self._along[k - 1]) / (self._along[k] - self._along[k - 1])
         pair = zip(self._points[k - 1], self._points[k], strict=True)
-        return [a + share * (b - a) for a, b in pair]
+        return [a + fraction * (b - a) for a, b in pair]
 
 
 class CircleMotion:

@@ -1,7 +1,7 @@
 """AprilTags: their code words, cells and shape.
 
 Frame of a tag, FLU: the origin is on the ground below the centre, z points out of the printed face,
-x to the top of the picture and y to its left. The face is `FACE_M` above the origin.
+x to the top of the image and y to its left. The face is `FACE_M` above the origin.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def code_words() -> tuple[int, ...]:
 
 
 def tag_cells(tag_id: int) -> NDArray[np.bool_]:
-    """Returns (8, 8) whether cells are white, row by row from the top left of the picture.
+    """Returns (8, 8) whether cells are white, row by row from the top left of the image.
 
     Raises `IndexError` for an unknown id.
     """
@@ -51,7 +51,7 @@ def tag_cells(tag_id: int) -> NDArray[np.bool_]:
 def tag_corners(size_m: float) -> Array:
     """Returns the corners (4, 3) m of the black border in the tag's frame.
 
-    Order: top left, top right, bottom right, bottom left of the picture, as OpenCV's detector.
+    Order: top left, top right, bottom right, bottom left of the image, as OpenCV's detector.
     """
     half = 0.5 * size_m
     flat = np.array([[half, half], [half, -half], [-half, -half], [-half, half]])

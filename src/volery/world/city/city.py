@@ -84,7 +84,7 @@ def build_city(
     )
 
 
-def _on(terrain: Terrain, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _on(terrain: Terrain, positions: NDArray[np.float64]) -> NDArray[np.bool_]:
     x0, y0, x1, y1 = terrain.bounds
-    x, y = places[:, 0], places[:, 1]
+    x, y = positions[:, 0], positions[:, 1]
     return np.asarray((x >= x0) & (x < x1) & (y >= y0) & (y < y1))

@@ -48,30 +48,30 @@ def place_lamps(streets: Streets, rule: FurnitureRule, seed: int) -> Array:
         return np.zeros((0, 4))
     from_wall_m = streets.rule.pavement_m - _FROM_KERB_M
     lines = kerb_lines(streets, max(from_wall_m, 0.3), 0.0)
-    places = _along(lines, rule.lamp_spacing_m, seed, "city/lamps")
-    return places[_apart(places, 0.6 * rule.lamp_spacing_m)]
+    poses = _along(lines, rule.lamp_spacing_m, seed, "city/lamps")
+    return poses[_apart(poses, 0.6 * rule.lamp_spacing_m)]
 
 
 def place_trees(streets: Streets, rule: FurnitureRule, seed: int, lamps: Array) -> Inventory:
     """Returns street trees, none near a lamp; trunk diameters are drawn, heights follow."""
-    places = np.zeros((0, 4))
+    poses = np.zeros((0, 4))
     if rule.tree_spacing_m:
         from_wall_m = streets.rule.pavement_m + _TREES_BEYOND_KERB_M
         lines = kerb_lines(streets, from_wall_m, _TREE_ROADWAY_M)
-        places = _along(lines, rule.tree_spacing_m, seed, "city/trees")
-    kept = _apart(np.concatenate([lamps, places]), 0.35 * rule.tree_spacing_m)[len(lamps) :]
-    random = generator(seed, "city/tree").random((len(places), 2))
+        poses = _along(lines, rule.tree_spacing_m, seed, "city/trees")
+    kept = _apart(np.concatenate([lamps, poses]), 0.35 * rule.tree_spacing_m)[len(lamps) :]
+    random = generator(seed, "city/tree").random((len(poses), 2))
     chosen = kept & (random[:, 0] < rule.tree_fraction)
     low, high = _TREE_DBH_M
     dbh = low + (high - low) * random[chosen, 1]
     count = len(dbh)
-    return Inventory(places[chosen, :2], dbh, np.full(count, np.nan), ("",) * count)
+    return Inventory(poses[chosen, :2], dbh, np.full(count, np.nan), ("",) * count)
 
 
 def _along(lines: Sequence[Array], spacing_m: float, seed: int, stream: str) -> Array:
     """Returns positions (n, 4) a spacing apart on lines, from random starts, with their right."""
     starts = generator(seed, stream).random(len(lines))
-    places = [np.zeros((0, 4))]
+    poses = [np.zeros((0, 4))]
     for line, start in zip(lines, starts, strict=True):
         step = np.diff(line, axis=0)
         length = np.hypot(*step.T)
@@ -80,21 +80,21 @@ def _along(lines: Sequence[Array], spacing_m: float, seed: int, stream: str) -> 
         piece = np.minimum(np.searchsorted(end, at, side="right"), len(length) - 1)
         forward = step[piece] / length[piece, None]
         xy = line[piece] + (at - (end - length)[piece])[:, None] * forward
-        places.append(np.column_stack([xy, forward[:, 1], -forward[:, 0]]))
-    return np.concatenate(places)
+        poses.append(np.column_stack([xy, forward[:, 1], -forward[:, 0]]))
+    return np.concatenate(poses)
 
 
-def _apart(places: Array, least_m: float) -> NDArray[np.bool_]:
-    """Returns which positions are at least `least_m` from all earlier selected ones."""
-    kept = np.zeros(len(places), dtype=bool)
+def _apart(poses: Array, min_distance_m: float) -> NDArray[np.bool_]:
+    """Returns which positions are at least `min_distance_m` from all earlier selected ones."""
+    kept = np.zeros(len(poses), dtype=bool)
     cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
-    side = max(least_m, 1e-3)
-    for k, (x, y) in enumerate(places[:, :2].tolist()):
+    side = max(min_distance_m, 1e-3)
+    for k, (x, y) in enumerate(poses[:, :2].tolist()):
         i, j = int(x // side), int(y // side)
         near = (
             p for di in (-1, 0, 1) for dj in (-1, 0, 1) for p in cells.get((i + di, j + dj), ())
         )
-        if all((x - px) ** 2 + (y - py) ** 2 >= least_m**2 for px, py in near):
+        if all((x - px) ** 2 + (y - py) ** 2 >= min_distance_m**2 for px, py in near):
             kept[k] = True
             cells.setdefault((i, j), []).append((x, y))
     return kept

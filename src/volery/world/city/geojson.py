@@ -22,7 +22,7 @@ from volery.core.errors import DataFileError
 from volery.core.text_files import decode_text
 from volery.world.city.tags import Tags, tags_of
 
-MOST_BYTES = 256_000_000
+MAX_BYTES = 256_000_000
 """Maximum file size: parsed larger files would need gigabytes."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
 _BINARY = (b"PK\x03\x04", b"\x1f\x8b", b"SQLite format 3\0", b"\0\0\x27\x0a")
@@ -94,9 +94,9 @@ def _load(path: Path) -> list[Any]:
     """Returns the JSON values of a file, at least one."""
     try:
         size = path.stat().st_size
-        if size > MOST_BYTES:
+        if size > MAX_BYTES:
             raise DataFileError(
-                f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB are read"
+                f"{path} has {size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are read"
             )
         data = path.read_bytes()
         if data.startswith(_BINARY):

@@ -37,7 +37,7 @@ _LEVELS = ("building_levels", "levels", "num_floors")
 _MIN_LEVELS = ("building_min_level", "min_level", "min_floor")
 _UNKNOWN = (-1.0, -999.0, -9999.0, -99999.0)
 """Marks of unknown heights: of Microsoft's building footprints, and of GIS programs."""
-_MOST_LEVELS = 300.0
+_MAX_LEVELS = 300.0
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _levels(tags: Tags, keys: tuple[str, ...]) -> tuple[float | None, str]:
             continue
         # "3;4": parts of different height in one outline; the tallest counts
         parts = str(given).split(";") if isinstance(given, str | int | float) else []
-        numbers = [n for n in map(_number, parts) if n is not None and 0.0 < n <= _MOST_LEVELS]
+        numbers = [n for n in map(_number, parts) if n is not None and 0.0 < n <= _MAX_LEVELS]
         if parts and len(numbers) == len(parts) and not isinstance(given, bool):
             return max(numbers), ""
         if _number(str(given)) == 0.0:  # a hall without storeys

@@ -28,11 +28,11 @@ from volery.world.city.selection import is_part, reasons_in_words, select_buildi
 
 Region = tuple[float, float, float, float]
 
-LEAST_AREA_M2 = 1.0
+MIN_AREA_M2 = 1.0
 """Minimum area; smaller footprints are mapping errors (modelling choice)."""
-FARTHEST_M = 50_000.0
+MAX_DISTANCE_M = 50_000.0
 """Maximum distance from the map's origin: beyond it a flat map is wrong by 200 m of height."""
-_MOST_MENDED = 1000
+_MAX_REPAIRED_CORNERS = 1000
 """Maximum corners of a self-intersecting outline: it may have this number squared of parts."""
 _SAME = 0.999
 """Fraction of common area at which two footprints count as duplicates."""
@@ -108,7 +108,7 @@ def read_outlines(
             f"{path}: it contains no outline of a building; all {len(features)} features "
             f"{_no_buildings(selection.others)}"
         )
-    _check_place(path, selection.buildings, frame)
+    _check_position(path, selection.buildings, frame)
     repaired: list[tuple[str, str]] = []
     dropped: list[tuple[str, str]] = []
     outlines: list[Outline] = []
@@ -143,14 +143,14 @@ def read_outlines(
     )
 
 
-def _check_place(path: str | Path, features: Sequence[Feature], frame: LocalFrame) -> None:
+def _check_position(path: str | Path, features: Sequence[Feature], frame: LocalFrame) -> None:
     rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
     corners = [ring for ring in rings if len(ring)]
     if not corners:
         raise DataFileError(f"{path}: it contains no outline of a building")
     middle = np.median(np.concatenate(corners), axis=0)
     away = float(np.linalg.norm(_in_map(middle[None], frame)))
-    if away > FARTHEST_M:
+    if away > MAX_DISTANCE_M:
         raise DataFileError(
             f"{path}: the outlines lie {away / 1000.0:.0f} km from the map's origin; they are "
             f"around latitude_deg = {middle[1]:.4f}, longitude_deg = {middle[0]:.4f} in "
@@ -184,17 +184,17 @@ def _footprint(feature: Feature, frame: LocalFrame) -> tuple[Any, str, str]:
     if not shape.is_valid:
         reason = shapely.is_valid_reason(shape).split("[")[0].lower()
         corners = shapely.get_num_coordinates(shape)
-        if corners > _MOST_MENDED:
+        if corners > _MAX_REPAIRED_CORNERS:
             return None, "", f"{reason}: {corners} corners are too many to be mended"
         mended.append(f"{reason}: rebuilt from the area it encloses")
         shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
     parts = [
         part
         for part in shapely.get_parts(shape)
-        if part.geom_type == "Polygon" and part.area >= LEAST_AREA_M2
+        if part.geom_type == "Polygon" and part.area >= MIN_AREA_M2
     ]
     if not parts:
-        return None, "", f"no area of {LEAST_AREA_M2:g} m2"
+        return None, "", f"no area of {MIN_AREA_M2:g} m2"
     joined = shapely.orient_polygons(shapely.MultiPolygon(parts))
     return joined, "; ".join(dict.fromkeys(mended)), ""
 

@@ -22,7 +22,7 @@ from volery.world.materials import Material
 _ROADWAY_M = 3.0
 """Minimum width of asphalt: a car's (modelling choice)."""
 _CELL_M = 0.5
-_MOST_CELLS = 16_000_000
+_MAX_CELLS = 16_000_000
 """Maximum number of cells; larger cities get larger cells."""
 _ROUGH_M = 0.1
 """Tolerance of kerbs, which saves most of their corners."""
@@ -59,8 +59,8 @@ def find_streets(footprints: Sequence[Any], rule: StreetRule) -> Streets:
     walls = shapely.union_all(list(footprints))
     filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(walls)]
     blocks = shapely.union_all(filled)
-    reach = rule.max_width_m / 2.0
-    fabric = blocks.buffer(reach, quad_segs=_ROUND).buffer(-reach, quad_segs=_ROUND)
+    half_width = rule.max_width_m / 2.0
+    fabric = blocks.buffer(half_width, quad_segs=_ROUND).buffer(-half_width, quad_segs=_ROUND)
     road = fabric.difference(blocks.buffer(rule.pavement_m, quad_segs=_ROUND))
     half = _ROADWAY_M / 2.0
     road = road.buffer(-half, quad_segs=_ROUND).buffer(half, quad_segs=_ROUND).simplify(_ROUGH_M)
@@ -89,7 +89,7 @@ def cover_of(streets: Streets) -> GroundCover:
     if paved.is_empty:
         return GroundCover(np.zeros((0, 0), np.uint8), 0.0, 0.0, 1.0)
     x0, y0, x1, y1 = paved.bounds
-    cell = max(_CELL_M, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_CELLS))
+    cell = max(_CELL_M, math.sqrt((x1 - x0) * (y1 - y0) / _MAX_CELLS))
     shape = math.ceil((y1 - y0) / cell), math.ceil((x1 - x0) / cell)
     material = np.full(shape, Material.GROUND, dtype=np.uint8)
     material[covered(paved, (x0, y0), cell, shape)] = Material.PAVING
@@ -116,8 +116,8 @@ def covered(
         count = np.clip(np.ceil(high), 0, rows).astype(np.int64) - first
         edge = np.repeat(np.arange(len(count)), count)
         row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
-        share = (row - v[edge]) / (v[edge + 1] - v[edge])
-        crossing = u[edge] + share * (u[edge + 1] - u[edge])
+        fraction = (row - v[edge]) / (v[edge + 1] - v[edge])
+        crossing = u[edge] + fraction * (u[edge + 1] - u[edge])
         column = np.clip(np.ceil(crossing), 0, columns).astype(np.int64)
         np.logical_xor.at(flips, (row, column), True)
     return np.asarray(np.logical_xor.accumulate(flips[:, :-1], axis=1))

@@ -18,7 +18,7 @@ from volery.world.mesh import EMPTY, Mesh
 
 _TRIANGLES = (0, 1, 2, 0, 2, 3)
 """Triangles of a rectangle, by its corners."""
-MOST_FACES = 1_000_000
+MAX_FACES = 1_000_000
 """Maximum rectangles of a mesh: with Embree's search trees they take about .6 GB."""
 
 
@@ -55,10 +55,10 @@ def block_mesh(grid: GridMap, bottom_m: float, top_m: float) -> Mesh:
 
 
 def _check_faces(grid: GridMap, faces: int) -> None:
-    if faces > MOST_FACES:
+    if faces > MAX_FACES:
         raise CommandError(
             f"grid map '{grid.name}' is too irregular: its blocks have at least {faces} "
-            f"faces, more than {MOST_FACES}; use a coarser grid or fewer single cells"
+            f"faces, more than {MAX_FACES}; use a coarser grid or fewer single cells"
         )
 
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from volery.core.errors import CommandError
 
-MOST_CELLS = 4096 * 4096
+MAX_CELLS = 4096 * 4096
 LARGEST_M = 1000.0
 """Maximum side of a cell and height of a block."""
-FARTHEST_M = 100_000.0
+MAX_DISTANCE_M = 100_000.0
 """Maximum distance of the origin; beyond, single precision is coarser than a centimetre."""
 
 
@@ -40,10 +40,10 @@ class GridMap:
 
     def __post_init__(self) -> None:
         blocked = np.ascontiguousarray(self.blocked, dtype=np.bool_).view()
-        if blocked.ndim != 2 or not 0 < blocked.size <= MOST_CELLS:
+        if blocked.ndim != 2 or not 0 < blocked.size <= MAX_CELLS:
             shape = " x ".join(str(side) for side in blocked.shape)
             raise CommandError(
-                f"grid map '{self.name}' has {shape} cells; allowed are 1 to {MOST_CELLS} "
+                f"grid map '{self.name}' has {shape} cells; allowed are 1 to {MAX_CELLS} "
                 "in rows and columns"
             )
         for key, value in (
@@ -54,10 +54,10 @@ class GridMap:
                 raise CommandError(
                     f"grid map '{self.name}': {key} must be .001 to {LARGEST_M:g}, not {value:g}"
                 )
-        reach = max(abs(self.origin_m[0]), abs(self.origin_m[1]))
-        if not (reach <= FARTHEST_M and math.isfinite(self.yaw_rad)):
+        max_offset = max(abs(self.origin_m[0]), abs(self.origin_m[1]))
+        if not (max_offset <= MAX_DISTANCE_M and math.isfinite(self.yaw_rad)):
             raise CommandError(
-                f"grid map '{self.name}': the origin must be within {FARTHEST_M:g} m and yaw "
+                f"grid map '{self.name}': the origin must be within {MAX_DISTANCE_M:g} m and yaw "
                 f"finite, not {self.origin_m}, {self.yaw_rad}"
             )
         blocked.flags.writeable = False

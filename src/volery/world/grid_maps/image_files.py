@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEAD = struct.Struct(">8sI4sII")
 """Signature, then length, name, width and height of the first chunk."""
-_MOST_BYTES = 8 * MOST_CELLS
+_MAX_BYTES = 8 * MAX_CELLS
 _LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue: ITU-R BT.601."""
 _MEAN = (1.0 / 3.0,) * 3
@@ -50,8 +50,8 @@ def read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """
     try:
         size = path.stat().st_size
-        if size > _MOST_BYTES:
-            raise DataFileError(f"{path}: {size} bytes are too many; at most {_MOST_BYTES}")
+        if size > _MAX_BYTES:
+            raise DataFileError(f"{path}: {size} bytes are too many; at most {_MAX_BYTES}")
         data = path.read_bytes()
     except OSError as error:
         raise DataFileError(f"{path}: cannot be read: {error.strerror}") from None
@@ -64,9 +64,9 @@ def _check_size(data: bytes, where: str) -> None:
     if len(data) < _HEAD.size or data[: len(_SIGNATURE)] != _SIGNATURE:
         raise DataFileError(f"{where}: not a PNG image")
     _, _, name, width, height = _HEAD.unpack_from(data)
-    if name != b"IHDR" or not 0 < width * height <= MOST_CELLS:
+    if name != b"IHDR" or not 0 < width * height <= MAX_CELLS:
         raise DataFileError(
-            f"{where}: a PNG image of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
+            f"{where}: a PNG image of {width} x {height} pixels; allowed are 1 to {MAX_CELLS}"
         )
 
 
@@ -79,24 +79,24 @@ def _decode(
     try:
         with (
             warnings.catch_warnings(action="ignore"),
-            Image.open(io.BytesIO(data), formats=formats) as picture,
+            Image.open(io.BytesIO(data), formats=formats) as image,
         ):
-            width, height = picture.size
-            if not 0 < width * height <= MOST_CELLS:
+            width, height = image.size
+            if not 0 < width * height <= MAX_CELLS:
                 raise DataFileError(
-                    f"{where}: an image of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
+                    f"{where}: an image of {width} x {height} pixels; allowed are 1 to {MAX_CELLS}"
                 )
-            picture.load()
-            if picture.mode.startswith("I"):  # 16 bits of grey
-                grey = np.asarray(picture, dtype=np.float32) / 65535.0
+            image.load()
+            if image.mode.startswith("I"):  # 16 bits of grey
+                grey = np.asarray(image, dtype=np.float32) / 65535.0
                 return grey, np.ones_like(grey)
-            colours = np.asarray(picture.convert("RGBA"))
+            colours = np.asarray(image.convert("RGBA"))
     except UnidentifiedImageError:
         raise DataFileError(
             f"{where}: the image is damaged, or not {' or '.join(formats)}"
         ) from None
     except Image.DecompressionBombError:
-        raise DataFileError(f"{where}: too many pixels; allowed are 1 to {MOST_CELLS}") from None
+        raise DataFileError(f"{where}: too many pixels; allowed are 1 to {MAX_CELLS}") from None
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
         raise DataFileError(f"{where}: the image is damaged: {error}") from None
     grey = np.zeros(colours.shape[:2], dtype=np.float32)

@@ -22,7 +22,7 @@ from volery.core.errors import DataFileError
 from volery.core.text_files import read_text
 from volery.world.grid_maps.image_files import read_image
 
-_MOST_BYTES = 64_000
+_MAX_BYTES = 64_000
 _MODES = ("trinary", "scale", "raw")
 _FLAGS = {"no": 0.0, "off": 0.0, "false": 0.0, "yes": 1.0, "on": 1.0, "true": 1.0}
 _BLOCKED_FROM = 50.0
@@ -90,7 +90,7 @@ def _settings(path: Path) -> dict[str, Any]:
     from ruamel.yaml import YAML
 
     try:
-        if path.stat().st_size > _MOST_BYTES:
+        if path.stat().st_size > _MAX_BYTES:
             raise DataFileError(f"{path}: too large for a map's .yaml")
         read = YAML(typ="safe", pure=True).load(read_text(path))
     except OSError as error:
@@ -109,8 +109,8 @@ def _number(
     settings: dict[str, Any],
     key: str,
     default: float | None,
-    least: float,
-    most: float,
+    minimum: float,
+    maximum: float,
     words: Mapping[str, float] = MappingProxyType({}),
 ) -> float:
     """Returns a number, which may be in quotes; words: others that YAML 1.1 knows."""
@@ -118,9 +118,9 @@ def _number(
     if isinstance(value, str):
         with suppress(ValueError):  # is shown below
             value = words[value.lower()] if value.lower() in words else float(value)
-    if not isinstance(value, int | float) or not least <= value <= most:
+    if not isinstance(value, int | float) or not minimum <= value <= maximum:
         shown = "missing" if value is None else f"{value!r}"[:40]
-        raise DataFileError(f"{path}: {key} is {shown}; allowed are {least:g} to {most:g}")
+        raise DataFileError(f"{path}: {key} is {shown}; allowed are {minimum:g} to {maximum:g}")
     return float(value)
 
 

@@ -11,7 +11,7 @@ from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.core.text_files import decode_text
 from volery.core.text_tables import matrix_cells, matrix_lines
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 
 _ZERO, _ONE, _COMMA = (ord(character) for character in "01,")
 _WORDS = {"false": 0.0, "true": 1.0}
@@ -36,8 +36,8 @@ def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
                 f"the lines before it {len(rows[0])}"
             )
         cells += len(row)
-        if cells > MOST_CELLS:
-            raise DataFileError(f"{where}: more than {MOST_CELLS} entries")
+        if cells > MAX_CELLS:
+            raise DataFileError(f"{where}: more than {MAX_CELLS} entries")
         rows.append(row)
     if not rows:
         raise DataFileError(f"{where}: it has no row; a matrix of 0 and 1 is needed")

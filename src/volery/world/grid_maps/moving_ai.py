@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 
 FREE, BLOCKED = b".GS", b"@OTW"
 _HEAD_LINES = 4
@@ -71,9 +71,9 @@ def _head(lines: list[bytes], where: str) -> tuple[int, int]:
         if k in (1, 2):
             sizes[found[0]] = int(found[1])
     height, width = sizes.get(b"height", 0), sizes.get(b"width", 0)
-    if not 0 < height * width <= MOST_CELLS:
+    if not 0 < height * width <= MAX_CELLS:
         raise DataFileError(
-            f"{where}: {width} x {height} cells; allowed are 1 to {MOST_CELLS} in all"
+            f"{where}: {width} x {height} cells; allowed are 1 to {MAX_CELLS} in all"
         )
     return height, width
 

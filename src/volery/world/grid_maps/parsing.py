@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
-from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.grid_map import MAX_CELLS
 from volery.world.grid_maps.image_files import parse_image, parse_pgm
 from volery.world.grid_maps.matrix import parse_matrix
 from volery.world.grid_maps.moving_ai import parse_moving_ai
 
-MOST_BYTES = 4 * MOST_CELLS
+MAX_BYTES = 4 * MAX_CELLS
 """Maximum size of a file: a matrix of the most cells with separators and blanks."""
 
 _SUFFIXES = (".csv", ".txt", ".png", ".pgm", ".map")
@@ -35,8 +35,8 @@ def read_cells(path: Path, threshold: float = 0.5) -> NDArray[np.bool_]:
         )
     try:
         size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise DataFileError(f"{path}: {size} bytes are too many; at most {MOST_BYTES}")
+        if size > MAX_BYTES:
+            raise DataFileError(f"{path}: {size} bytes are too many; at most {MAX_BYTES}")
         data = path.read_bytes()
     except OSError as error:
         raise DataFileError(f"{path}: cannot be read: {error.strerror}") from None

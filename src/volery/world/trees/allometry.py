@@ -23,7 +23,7 @@ _M_PER_FOOT = 0.3048
 _CM_PER_INCH = 2.54
 
 
-_LEAST_SHARE = 1e-6
+_MIN_FRACTION = 1e-6
 _EXPONENT = Quantity("", 20.0)
 
 
@@ -128,7 +128,7 @@ class DiameterSpread(Data):
     @model_validator(mode="after")
     def _holds_some(self) -> Self:
         low, high = self._ends()
-        if not high - low > _LEAST_SHARE:
+        if not high - low > _MIN_FRACTION:
             raise ValueError("this spread has no diameters from smallest_cm to largest_cm")
         return self
 

@@ -32,9 +32,9 @@ class Branches:
     def at(self, fraction: Array) -> tuple[Array, Array, Array]:
         """Returns points, unit tangents (B, N, 3) and radii (B, N) at `fraction` (B, N)."""
         last = self.points.shape[1] - 1
-        place = np.clip(fraction, 0.0, 1.0) * last
-        k = np.minimum(place.astype(np.int64), last - 1)
-        part = (place - k)[..., None]
+        position = np.clip(fraction, 0.0, 1.0) * last
+        k = np.minimum(position.astype(np.int64), last - 1)
+        part = (position - k)[..., None]
         row = np.arange(len(self.points))[:, None]
         start, end = self.points[row, k], self.points[row, k + 1]
         radius = self.radii[row, k] * (1.0 - part[..., 0]) + self.radii[row, k + 1] * part[..., 0]
@@ -99,8 +99,8 @@ def grow(
     for k in range(segments):
         heading = unit(heading + bend * UP + noise[k])
         points[:, k + 1] = points[:, k] + step * heading
-    share = np.linspace(1.0, tip, segments + 1)
-    return Branches(points, np.asarray(radius)[:, None] * share)
+    fraction = np.linspace(1.0, tip, segments + 1)
+    return Branches(points, np.asarray(radius)[:, None] * fraction)
 
 
 def concatenated(batches: list[Branches]) -> Branches:

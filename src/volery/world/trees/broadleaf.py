@@ -25,33 +25,33 @@ def broadleaf(site: Site) -> Growth:
     trunk = stem(site)
     limbs = _limbs(site, trunk)
     shoots = _side_shoots(site, limbs, site.count(site.species.crown.twigs), 0.25, 0.52)
-    orders = [limbs, shoots]
+    branch_orders = [limbs, shoots]
     if site.maturity >= _TWIGS_FROM:
-        orders.append(_side_shoots(site, shoots, 4, 0.2, 0.55))
-    bearing = concatenated([b.decimated(2) for b in orders[1:]])
+        branch_orders.append(_side_shoots(site, shoots, 4, 0.2, 0.55))
+    bearing = concatenated([b.decimated(2) for b in branch_orders[1:]])
     count, area = leaf_count(site)
     points, tangents = along(bearing, count, site.rng)
     blades = flat_leaves(points, tangents, site, forward=0.7, tilt=0.35).with_area(area)
-    return Growth(trunk, orders, blades)
+    return Growth(trunk, branch_orders, blades)
 
 
 def _limbs(site: Site, trunk: Branches) -> Branches:
     """Grows limbs on the stem, up to the crown's envelope."""
     crown, rng = site.species.crown, site.rng
     count = site.count(crown.branches)
-    share = (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
+    height_fraction = (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
     depth = site.height - site.crown_base
     # limbs crowd towards the crown's base, where they are largest
-    height = site.crown_base + 0.93 * depth * share**1.15
+    height = site.crown_base + 0.93 * depth * height_fraction**1.15
     base, thickness = on_stem(trunk, height)
     low, high = np.radians(crown.angle_deg)
-    angle = low + (high - low) * share + rng.normal(0.0, 0.12, count)
+    angle = low + (high - low) * height_fraction + rng.normal(0.0, 0.12, count)
     azimuth = GOLDEN_ANGLE * np.arange(count) + rng.normal(0.0, 0.4, count)
     upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (count, 3))
     direction = turned(upright, angle, azimuth)
     mean_angle = np.clip(angle - 0.45 * crown.lift, 0.25, 1.5)
-    reach = site.crown_radius * site.envelope(share) * rng.uniform(0.75, 1.05, count)
-    length = reach / np.maximum(np.sin(mean_angle), 0.5)
+    spread = site.crown_radius * site.envelope(height_fraction) * rng.uniform(0.75, 1.05, count)
+    length = spread / np.maximum(np.sin(mean_angle), 0.5)
     room = (site.height - height) / np.maximum(np.cos(mean_angle), 0.15)
     length = np.minimum(length, np.maximum(room, 0.15 * site.crown_radius))
     radius = np.minimum(0.62 * thickness, 0.016 * length + 0.004)
@@ -61,7 +61,7 @@ def _limbs(site: Site, trunk: Branches) -> Branches:
 
 
 def _side_shoots(
-    site: Site, parents: Branches, number: int, first: float, share_of_length: float
+    site: Site, parents: Branches, number: int, first: float, fraction_of_length: float
 ) -> Branches:
     """Grows `number` shoots on each parent, alternating left and right, and one continuation."""
     rng, count = site.rng, len(parents.points)
@@ -74,7 +74,7 @@ def _side_shoots(
     row = np.where(np.arange(number + 1) % 2 == 0, 0.0, np.pi)
     roll = row + rng.normal(0.0, 0.55, (count, number + 1))
     direction = turned(tangent, angle, roll)
-    taper = share_of_length * (1.15 - 0.6 * fraction) * rng.uniform(0.7, 1.25, fraction.shape)
+    taper = fraction_of_length * (1.15 - 0.6 * fraction) * rng.uniform(0.7, 1.25, fraction.shape)
     length = (parents.lengths[:, None] * taper).ravel()
     radius = np.minimum(0.7 * thickness.ravel(), 0.012 * length + 0.0015)
     return grow(

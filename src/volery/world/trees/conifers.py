@@ -108,17 +108,17 @@ def _limbs(site: Site, trunk: Branches, *, whorl: int, wobble: float) -> Branche
     crown, rng = site.species.crown, site.rng
     count = site.count(crown.branches)
     step = np.arange(count) // whorl
-    share = (step + 0.5 + rng.uniform(-0.3, 0.3, count)) / (step[-1] + 1)
+    fraction = (step + 0.5 + rng.uniform(-0.3, 0.3, count)) / (step[-1] + 1)
     depth = site.height - site.crown_base
-    height = site.crown_base + 0.97 * depth * share
+    height = site.crown_base + 0.97 * depth * fraction
     base, thickness = on_stem(trunk, height)
     low, high = np.radians(crown.angle_deg)
-    angle = low + (high - low) * share + rng.normal(0.0, 0.1, count)
+    angle = low + (high - low) * fraction + rng.normal(0.0, 0.1, count)
     azimuth = 2.0 * np.pi / whorl * np.arange(count) + GOLDEN_ANGLE * step
     azimuth = azimuth + rng.normal(0.0, 0.25, count)
     upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (count, 3))
-    reach = site.crown_radius * site.envelope(share) * rng.uniform(0.8, 1.05, count)
-    length = np.maximum(reach / np.maximum(np.sin(angle - 0.3 * crown.lift), 0.6), 0.08)
+    spread = site.crown_radius * site.envelope(fraction) * rng.uniform(0.8, 1.05, count)
+    length = np.maximum(spread / np.maximum(np.sin(angle - 0.3 * crown.lift), 0.6), 0.08)
     radius = np.minimum(0.5 * thickness, 0.012 * length + 0.005)
     return grow(
         rng,

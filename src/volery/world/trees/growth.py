@@ -65,12 +65,12 @@ class Site:
         """Height of the lowest branches, m."""
         return self.height * self.between(self.species.crown.base)
 
-    def envelope(self, share: Array) -> Array:
-        """Returns the fraction of the maximum crown radius at `share` of its depth from below."""
+    def envelope(self, fraction: Array) -> Array:
+        """Returns the fraction of the crown radius at `fraction` of its depth from below."""
         widest, power = self.species.crown.widest, 1.0 + self.species.crown.roundness
-        below = (widest - share) / (widest + 0.35)
-        above = (share - widest) / (1.0 - widest + 0.03)
-        beside = np.clip(np.where(share < widest, below, above), 0.0, 0.999)
+        below = (widest - fraction) / (widest + 0.35)
+        above = (fraction - widest) / (1.0 - widest + 0.03)
+        beside = np.clip(np.where(fraction < widest, below, above), 0.0, 0.999)
         return np.asarray((1.0 - beside**power) ** (1.0 / power))
 
 
@@ -104,8 +104,8 @@ class Growth:
         tops = [float(b.points[..., 2].max()) for b in (self.stem, *limbs)]
         if blades is not None and len(blades):
             blades = replace(blades, middle=drawn_in(blades.middle))
-            reach = np.abs(0.5 * blades.length * blades.axis[:, 2])
-            tops.append(float((blades.middle[:, 2] + reach).max()))
+            half_height = np.abs(0.5 * blades.length * blades.axis[:, 2])
+            tops.append(float((blades.middle[:, 2] + half_height).max()))
         factor = height / max(tops)
         return Growth(
             self.stem.scaled_z(factor),
@@ -217,9 +217,9 @@ def along(
     The results are points and unit tangents (count, 3), in order of growth.
     """
     bounds = np.concatenate([[0.0], np.cumsum(shoots.lengths)])
-    place = (np.arange(count) + rng.random(count)) / count * bounds[-1]
-    row = np.clip(np.searchsorted(bounds, place, side="right") - 1, 0, len(shoots.points) - 1)
-    fraction = start + (1.0 - start) * (place - bounds[row]) / np.diff(bounds)[row]
+    distance = (np.arange(count) + rng.random(count)) / count * bounds[-1]
+    row = np.clip(np.searchsorted(bounds, distance, side="right") - 1, 0, len(shoots.points) - 1)
+    fraction = start + (1.0 - start) * (distance - bounds[row]) / np.diff(bounds)[row]
     last = shoots.points.shape[1] - 1
     k = np.minimum((fraction * last).astype(np.int64), last - 1)
     begin, end = shoots.points[row, k], shoots.points[row, k + 1]

@@ -46,7 +46,7 @@ def palm(site: Site) -> Growth:
     start = 0.14
     points, tangents = along(fronds, leaves, rng, start=start)
     # leaflets are longest in the middle of a frond
-    place = (np.arange(leaves) * count / leaves) % 1.0
-    grown = 0.45 + 0.65 * np.sin(np.pi * np.clip(place + 0.08, 0.0, 1.0))
+    phase = (np.arange(leaves) * count / leaves) % 1.0
+    grown = 0.45 + 0.65 * np.sin(np.pi * np.clip(phase + 0.08, 0.0, 1.0))
     blades = flat_leaves(points, tangents, site, forward=0.55, tilt=0.3, grown=grown)
     return Growth(trunk, [fronds], blades.with_area(area))

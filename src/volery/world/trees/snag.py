@@ -24,11 +24,11 @@ def snag(site: Site) -> Growth:
 def _limbs(site: Site, trunk: Branches, rng: np.random.Generator) -> Branches:
     crown = site.species.crown
     count = site.count(crown.branches)
-    share = (np.arange(count) + rng.random(count)) / count
-    height = site.crown_base + 0.9 * (site.height - site.crown_base) * share * 0.95
+    fraction = (np.arange(count) + rng.random(count)) / count
+    height = site.crown_base + 0.9 * (site.height - site.crown_base) * fraction * 0.95
     base, thickness = on_stem(trunk, height)
     low, high = np.radians(crown.angle_deg)
-    angle = low + (high - low) * share + rng.normal(0.0, 0.15, count)
+    angle = low + (high - low) * fraction + rng.normal(0.0, 0.15, count)
     azimuth = GOLDEN_ANGLE * np.arange(count) + rng.normal(0.0, 0.5, count)
     upright = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (count, 3))
     # most limbs broke close to the trunk, a few are whole

@@ -139,8 +139,8 @@ class Species(Data):
     def maturity(self, size_class: int) -> float:
         """Returns the logarithmic position of a size class, 0 the thinnest to 1 the thickest."""
         classes = np.log(self.size_classes_cm)
-        reach = classes[-1] - classes[0]
-        return float((classes[size_class] - classes[0]) / reach) if reach > 0.0 else 1.0
+        span = classes[-1] - classes[0]
+        return float((classes[size_class] - classes[0]) / span) if span > 0.0 else 1.0
 
 
 def species_names() -> tuple[str, ...]:

@@ -55,7 +55,7 @@ TURBULENCE = np.dtype(
 _FOOT = 0.3048
 _LOW, _HIGH = 10.0, 1000.0
 """Range of the low-altitude model, ft."""
-_LEAST_SPEED = 1.0
+_MIN_SPEED = 1.0
 """Minimum of V, m/s (modelling choice: eddies drift past a hovering UAV even in a calm)."""
 _CALM = 0.3
 """Horizontal speed below which a wind has no direction, m/s (Beaufort 0)."""
@@ -102,22 +102,22 @@ def turbulent_velocity(
         wind_x * wind_x + wind_y * wind_y + wind_z * wind_z,
         air_x * air_x + air_y * air_y + air_z * air_z,
     )
-    way = max(math.sqrt(speed), _LEAST_SPEED) * period / _FOOT  # ft past the UAV in a tick
+    distance = max(math.sqrt(speed), _MIN_SPEED) * period / _FOOT  # ft past the UAV in a tick
     begun = state.axis[0] != 0.0 or state.axis[1] != 0.0
     draw = _DRAWS * tick
-    across = way * root * root * root / h  # in lengths Lu = Lv
+    across = distance * root * root * root / h  # in lengths Lu = Lv
     keep, whole, coupled, rest = _step_of(across, begun)
     state.longitudinal = keep * state.longitudinal + whole * normal(state.key, draw)
     _step(state.lateral, across, keep, whole, coupled, rest, state.key, draw + 1)
-    share = 1.0 - keep  # of these states that is new
-    upward = way / h  # in lengths Lw
+    fraction = 1.0 - keep  # of these states that is new
+    upward = distance / h  # in lengths Lw
     keep, whole, coupled, rest = _step_of(upward, begun)
     _step(state.vertical, upward, keep, whole, coupled, rest, state.key, draw + 3)
 
     if wind_x * wind_x + wind_y * wind_y >= _CALM * _CALM:
-        _turn(state.axis, wind_x, wind_y, share)
+        _turn(state.axis, wind_x, wind_y, fraction)
     elif air_x * air_x + air_y * air_y >= _CALM * _CALM:
-        _turn(state.axis, air_x, air_y, share)
+        _turn(state.axis, air_x, air_y, fraction)
     elif not begun:
         state.axis[0] = 1.0
 
@@ -171,8 +171,8 @@ def _step(
 
 
 @inner_kernel
-def _turn(axis: NDArray[np.float64], x: float, y: float, share: float) -> None:
-    """Turns the axis by the fraction `share` towards the line along (x, y).
+def _turn(axis: NDArray[np.float64], x: float, y: float, fraction: float) -> None:
+    """Turns the axis by the fraction `fraction` towards the line along (x, y).
 
     Turbulence is the same forwards and backwards, so the axis is a line; it turns within a length
     L, so that no change of direction makes the air jump.
@@ -180,8 +180,8 @@ def _turn(axis: NDArray[np.float64], x: float, y: float, share: float) -> None:
     length = math.sqrt(x * x + y * y)
     if x * axis[0] + y * axis[1] < 0.0:
         length = -length
-    c = axis[0] + share * (x / length - axis[0])
-    s = axis[1] + share * (y / length - axis[1])
+    c = axis[0] + fraction * (x / length - axis[0])
+    s = axis[1] + fraction * (y / length - axis[1])
     length = math.sqrt(c * c + s * s)
     axis[0] = c / length
     axis[1] = s / length

@@ -23,8 +23,8 @@ def gust_velocity(air: Any, position: Array, time: float) -> tuple[float, float,
         left = air.gust_length[g] - since
         if since > 0.0 and left > 0.0:
             phase = min(since, left) * air.gust_inverse_rise[g]
-            share = 1.0 if phase >= 1.0 else 0.5 - 0.5 * math.cos(math.pi * phase)
-            x += share * air.gust_amplitude[g, 0]
-            y += share * air.gust_amplitude[g, 1]
-            z += share * air.gust_amplitude[g, 2]
+            fraction = 1.0 if phase >= 1.0 else 0.5 - 0.5 * math.cos(math.pi * phase)
+            x += fraction * air.gust_amplitude[g, 0]
+            y += fraction * air.gust_amplitude[g, 1]
+            z += fraction * air.gust_amplitude[g, 2]
     return x, y, z

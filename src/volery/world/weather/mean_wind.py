@@ -23,13 +23,13 @@ def mean_wind(air: Any, nodes: Array, position: Array, height: float) -> tuple[f
     """
     if air.kind == FIELD:
         return field_velocity(air, nodes, position)
-    share = 1.0
+    factor = 1.0
     if air.kind == LOG:
         # profile_shape: roughness, m. profile_scale: 1 / ln(reference / roughness)
         above = min(max(height, air.profile_shape), _TOP)
-        share = math.log(above / air.profile_shape) * air.profile_scale
+        factor = math.log(above / air.profile_shape) * air.profile_scale
     elif air.kind == POWER:
         # profile_shape: exponent. profile_scale: 1 / reference, 1/m
         above = min(max(height, 0.0), _TOP)
-        share = (above * air.profile_scale) ** air.profile_shape
-    return share * air.velocity[0], share * air.velocity[1], share * air.velocity[2]
+        factor = (above * air.profile_scale) ** air.profile_shape
+    return factor * air.velocity[0], factor * air.velocity[1], factor * air.velocity[2]

@@ -80,10 +80,10 @@ def field_velocity(air: Any, nodes: Array, position: Array) -> tuple[float, floa
 @inner_kernel
 def _cell(air: Any, position: Array, axis: int, count: int) -> tuple[int, float]:
     """Returns the number of the cell along an axis and the position in it, 0 to 1."""
-    place = (position[axis] - air.field_origin[axis]) * air.field_inverse_spacing[axis]
-    place = min(max(place, 0.0), count - 1.0)
-    cell = max(min(int(place), count - 2), 0)
-    return cell, place - cell
+    index = (position[axis] - air.field_origin[axis]) * air.field_inverse_spacing[axis]
+    index = min(max(index, 0.0), count - 1.0)
+    cell = max(min(int(index), count - 2), 0)
+    return cell, index - cell
 
 
 @inner_kernel

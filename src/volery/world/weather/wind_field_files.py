@@ -26,7 +26,7 @@ _COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 _SHAPES = {"velocity_m_s": "(Z, Y, X, 3)", "origin_m": "(3,)", "spacing_m": "(3,)"}
 _SHOWN_FAULTS = 20
 _SHOWN_LETTERS = 60
-_MOST_BYTES = 1_000_000_000
+_MAX_BYTES = 1_000_000_000
 _SLACK = 1e-2
 """Tolerance of a node's position as a fraction of the spacing: written coordinates are rounded."""
 
@@ -56,8 +56,8 @@ def _read_npz(path: Path) -> Field:
         wanted = ", ".join(f"{name} {shape}" for name, shape in _SHAPES.items())
         raise DataFileError(f"wind field {path} must hold {wanted}") from None
     except Exception as error:  # zipfile raises any exception for a broken file
-        told = " ".join(str(error).split())[:200] or type(error).__name__
-        raise DataFileError(f"wind field {path} cannot be read: {told}") from None
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise DataFileError(f"wind field {path} cannot be read: {reason}") from None
     velocity, origin, spacing = held.values()
     for name, shape in _SHAPES.items():
         right = held[name].shape == (3,) if name != "velocity_m_s" else _is_grid(velocity)
@@ -67,9 +67,9 @@ def _read_npz(path: Path) -> Field:
             )
     wrong = np.argwhere(~(np.abs(velocity) <= MAX_WIND_M_S))
     if len(wrong):
-        place, value = tuple(wrong[0].tolist()), velocity[tuple(wrong[0])]
+        node, value = tuple(wrong[0].tolist()), velocity[tuple(wrong[0])]
         raise DataFileError(
-            f"wind field {path}: velocity_m_s{list(place)} = {value:g}; finite numbers within "
+            f"wind field {path}: velocity_m_s{list(node)} = {value:g}; finite numbers within "
             f"+-{MAX_WIND_M_S:g} m/s are allowed"
         )
     if not np.isfinite(origin).all():
@@ -80,11 +80,11 @@ def _read_npz(path: Path) -> Field:
 
 
 def _check_size(path: Path) -> None:
-    """Raises `ValueError` for an archive that unpacks to more than `_MOST_BYTES`."""
+    """Raises `ValueError` for an archive that unpacks to more than `_MAX_BYTES`."""
     with zipfile.ZipFile(path) as archive:
         size = sum(member.file_size for member in archive.infolist())
-    if size > _MOST_BYTES:
-        raise ValueError(f"it unpacks to {size / 1e6:.0f} MB; {_MOST_BYTES / 1e6:.0f} are allowed")
+    if size > _MAX_BYTES:
+        raise ValueError(f"it unpacks to {size / 1e6:.0f} MB; {_MAX_BYTES / 1e6:.0f} are allowed")
 
 
 def _is_grid(velocity: Array) -> bool:
@@ -180,8 +180,8 @@ def _axis_of(path: Path, column: Array, name: str) -> Array:
 def _check_complete(
     path: Path, flat: NDArray[np.intp], numbers: list[int], axes: list[Array]
 ) -> None:
-    _, first, place = np.unique(flat, return_index=True, return_inverse=True)
-    earlier = first[place]
+    _, first, inverse = np.unique(flat, return_index=True, return_inverse=True)
+    earlier = first[inverse]
     _report(
         path,
         [

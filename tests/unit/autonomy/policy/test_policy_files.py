@@ -42,8 +42,8 @@ def test_a_cut_or_changed_file_is_one_error(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     for _ in range(300):
         changed = bytearray(content)
-        for place in rng.integers(0, len(content), 3):
-            changed[place] = int(rng.integers(256))
+        for index in rng.integers(0, len(content), 3):
+            changed[index] = int(rng.integers(256))
         policy = _read_or_none(bytes(changed))
         assert policy is None or np.isfinite(policy.network.act(np.zeros(6))).all()
 

@@ -52,11 +52,11 @@ class Bench(NodeBench):
 
     @property
     def status(self) -> tuple[str, str]:
-        told = json.loads(self.heard["/uav1/policy/status"][-1].data)
-        return told["state"], told["reason"]
+        status = json.loads(self.received["/uav1/policy/status"][-1].data)
+        return status["state"], status["reason"]
 
     def last(self, topic: str) -> Any:
-        return self.heard[f"/uav1/{topic}"][-1]
+        return self.received[f"/uav1/{topic}"][-1]
 
 
 def _goal(x: float, y: float, z: float, frame: str = "map") -> Any:
@@ -85,7 +85,7 @@ def test_it_waits_for_a_goal_and_commands_nothing_before(tmp_path: Path) -> None
     assert bench.status == ("waiting", "no odometry yet")
     bench.decide(odometry(0, (0.0, 0.0, 2.0)))
     assert bench.status == ("waiting", "no goal yet")
-    assert not bench.heard["/uav1/cmd_vel"]
+    assert not bench.received["/uav1/cmd_vel"]
     bench.send("/uav1/policy/goal_pose", _goal(0.0, 0.0, 9.0))
     bench.decide(odometry(bench.now_ns, (0.0, 0.0, 2.0)))
     assert bench.last("cmd_vel").linear.z == 1.0
@@ -147,7 +147,7 @@ def test_switched_off_it_stops_once_and_leaves_the_uav(tmp_path: Path) -> None:
     for _ in range(3):
         bench.decide(odometry(bench.now_ns, (0.0, 0.0, 2.0)))
     assert bench.status == ("waiting", "not enabled")
-    assert [twist.linear.x for twist in bench.heard["/uav1/cmd_vel"]] == [1.0, 0.0]
+    assert [twist.linear.x for twist in bench.received["/uav1/cmd_vel"]] == [1.0, 0.0]
 
 
 def test_attitudes_are_commanded(tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def test_rates_are_commanded_and_held_once(tmp_path: Path) -> None:
         bench.decide()
     assert bench.status[0] == "holding"
     assert bench.holds == 1
-    assert len(bench.heard["/uav1/setpoint_raw/attitude"]) == 2
+    assert len(bench.received["/uav1/setpoint_raw/attitude"]) == 2
 
 
 def test_rotor_speeds_are_commanded(tmp_path: Path) -> None:
@@ -262,8 +262,8 @@ def test_positions_are_commanded_from_the_present_one(tmp_path: Path) -> None:
     bench = Bench(tmp_path, make_policy(description(action=action), zeros), goal=[0.0, 0.0, 0.0])
     bench.decide(odometry(0, (1.0, 1.0, 2.0), yaw=np.pi / 2))
     target = bench.last("setpoint_raw/local")
-    place = target.position
-    assert (place.x, place.y, place.z) == pytest.approx((1.0, 2.0, 4.0))
+    position = target.position
+    assert (position.x, position.y, position.z) == pytest.approx((1.0, 2.0, 4.0))
     assert target.yaw_rate == pytest.approx(0.2)
 
 

@@ -25,7 +25,7 @@ class Bench(NodeBench):
         own = {"policy": str(folder / "own.npz"), "goal": [0.0, 0.0, 0.0]}
         self.node = self.start(PolicyNode, **own, land_at_touchdown=is_asked)
         self.commands = self.listen("/uav1/cmd_vel")
-        self.told = self.listen("/uav1/policy/status")
+        self.statuses = self.listen("/uav1/policy/status")
 
     def _land(self, _request: Any) -> Any:
         self.landings += 1
@@ -38,7 +38,7 @@ class Bench(NodeBench):
         self.send("/uav1/flight_state", state)
         self.send("/uav1/odom", odometry(self.now_ns, (0.0, 0.0, 1.0)))
         self.run_to((self.now_ns // 200_000_000 + 1) * 200_000_000)
-        return str(json.loads(self.told[-1].data)["state"])
+        return str(json.loads(self.statuses[-1].data)["state"])
 
 
 def test_the_node_lands_once_and_commands_no_more(tmp_path: Path) -> None:

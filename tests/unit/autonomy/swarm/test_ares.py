@@ -14,19 +14,19 @@ def start(seed, count=7, box=3.0):
     """A random start as in the paper: birds in a box, at least 1 apart."""
     rng = np.random.default_rng(seed)
     while True:
-        places = rng.uniform(0.0, box, (count, 2))
-        apart = np.linalg.norm(places[:, None] - places, axis=2) + 99.0 * np.eye(count)
+        positions = rng.uniform(0.0, box, (count, 2))
+        apart = np.linalg.norm(positions[:, None] - positions, axis=2) + 99.0 * np.eye(count)
         if apart.min() >= 1.0:
-            return places, rng.uniform(0.25, 0.75, (count, 2))
+            return positions, rng.uniform(0.25, 0.75, (count, 2))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_random_start_ends_in_a_v(seed):
-    places, speeds = start(seed)
-    plan = plan_formation(places, speeds, seed)
+    positions, speeds = start(seed)
+    plan = plan_formation(positions, speeds, seed)
     assert plan.is_solved
     assert formation_fitness(plan.positions[-1], plan.velocities[-1]).cost == plan.cost <= 1e-3
-    assert (plan.positions[0] == places).all()
+    assert (plan.positions[0] == positions).all()
     assert (plan.velocities[0] == speeds).all()
 
 
@@ -50,10 +50,10 @@ def test_the_same_seed_gives_the_same_plan():
 def test_birds_keep_apart_where_they_must():
     settings = AresSettings(limits=FlockLimits(min_distance=0.9))
     plan = plan_formation(*start(3), settings=settings)
-    ways = plan.positions[:-1, None] + np.linspace(0, 1, 50)[:, None, None] * (
+    tracks = plan.positions[:-1, None] + np.linspace(0, 1, 50)[:, None, None] * (
         plan.positions[1:, None] - plan.positions[:-1, None]
     )
-    apart = np.linalg.norm(ways[:, :, :, None] - ways[:, :, None], axis=4) + 99.0 * np.eye(7)
+    apart = np.linalg.norm(tracks[:, :, :, None] - tracks[:, :, None], axis=4) + 99.0 * np.eye(7)
     assert apart.min() >= 0.9 - 1e-3
     assert plan.is_solved
 
@@ -74,9 +74,9 @@ def test_birds_that_cannot_keep_apart_have_no_plan():
 
 
 def test_birds_that_start_too_near_part():
-    places, speeds = start(5)
+    positions, speeds = start(5)
     limits = FlockLimits(min_distance=1.5)
-    plan = plan_formation(places, speeds, settings=AresSettings(limits=limits))
+    plan = plan_formation(positions, speeds, settings=AresSettings(limits=limits))
     assert plan.is_solved
     apart = np.linalg.norm(plan.positions[-1][:, None] - plan.positions[-1], axis=2)
     assert (apart + 99.0 * np.eye(7)).min() >= 1.5

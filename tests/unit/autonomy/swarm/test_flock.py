@@ -48,11 +48,11 @@ def test_a_team_swaps_across_its_middle_without_contact(behaviour):
     angle = np.arange(6) * np.pi / 3.0
     ring = np.stack([15.0 * np.cos(angle), 15.0 * np.sin(angle), np.full(6, 5.0)], axis=1)
     team = SwarmTeam(FlockNode, ring, behaviour=behaviour, swaps=True)
-    least = np.inf
+    nearest = np.inf
     for _ in range(600):
         team.fly(0.1)
-        least = min(least, distances(team.positions).min())
-    assert least > 1.0
+        nearest = min(nearest, distances(team.positions).min())
+    assert nearest > 1.0
     assert team.status["least_distance_m"] > 1.0
 
 
@@ -68,11 +68,11 @@ def test_a_team_avoids_its_obstacles():
     team = SwarmTeam(
         FlockNode, [[0.0, 0.0, 5.0]], waypoints_m=[[40.0, 1.0]], obstacles_m=[[20.0, 0.2, 1.0]]
     )
-    least = np.inf
+    nearest = np.inf
     for _ in range(400):
         team.fly(0.1)
-        least = min(least, np.hypot(*(team.positions[0, :2] - [20.0, 0.2])))
-    assert least > 1.3
+        nearest = min(nearest, np.hypot(*(team.positions[0, :2] - [20.0, 0.2])))
+    assert nearest > 1.3
     assert team.positions[0, 0] > 38.0
 
 
@@ -93,14 +93,14 @@ def test_a_team_avoids_what_its_lidars_see(behaviour):
     team = SwarmTeam(
         FlockNode, starts, behaviour=behaviour, goals_m=goals, scan="laser/horizontal/scan"
     )
-    least = np.inf
+    nearest = np.inf
     for _ in range(500):
         for row, name in enumerate(team.names):
             ranges = scan_of(post, radius, team.positions[row, :2])
             team.send(f"/{name}/laser/horizontal/scan", scan(team.now_ns, ranges))
         team.fly(0.1)
-        least = min(least, np.hypot(*(team.positions[:, :2] - post).T).min())
-    assert least > radius + 0.4
+        nearest = min(nearest, np.hypot(*(team.positions[:, :2] - post).T).min())
+    assert nearest > radius + 0.4
     np.testing.assert_allclose(team.positions[:, :2], goals, atol=1.5)
 
 

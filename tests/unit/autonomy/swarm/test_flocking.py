@@ -21,21 +21,21 @@ class Swarm:
         self.behaviour, self.around = behaviour, around or Surroundings()
         self.position, self.goal = np.array(position, float), np.array(goal, float)
         self.velocity = np.zeros_like(self.position)
-        self.least_distance = self.least_gap = np.inf
+        self.min_distance = self.min_gap = np.inf
 
     def fly(self, seconds):
         for _ in range(round(seconds / PERIOD_S)):
-            way = self.goal - self.position
-            distance = np.linalg.norm(way, axis=1, keepdims=True)
-            preferred = way / np.maximum(distance, 1e-9) * np.minimum(SPEED_M_S, 0.8 * distance)
+            offset = self.goal - self.position
+            distance = np.linalg.norm(offset, axis=1, keepdims=True)
+            preferred = offset / np.maximum(distance, 1e-9) * np.minimum(SPEED_M_S, 0.8 * distance)
             flock = flock_within(self.position, self.velocity, self.behaviour.radius_m)
             wanted = self.behaviour.velocities(flock, preferred, self.around)
             self.velocity = self.velocity + (wanted - self.velocity) * PERIOD_S / LAG_S
             self.position = self.position + self.velocity * PERIOD_S
-            self.least_distance = min(self.least_distance, distances(self.position).min())
+            self.min_distance = min(self.min_distance, distances(self.position).min())
             for x, y, radius in self.around.cylinders:
                 gaps = np.hypot(self.position[:, 0] - x, self.position[:, 1] - y) - radius
-                self.least_gap = min(self.least_gap, gaps.min())
+                self.min_gap = min(self.min_gap, gaps.min())
 
 
 def distances(position):
@@ -85,7 +85,7 @@ def test_a_flock_flies_on_together(kind):
     heading = swarm.velocity / np.linalg.norm(swarm.velocity, axis=1, keepdims=True)
     assert np.linalg.norm(heading.mean(axis=0)) > 0.99
     assert swarm.velocity[:, 0].min() > 2.0
-    assert swarm.least_distance > 2.5
+    assert swarm.min_distance > 2.5
 
 
 @pytest.mark.parametrize("kind", BEHAVIOURS)
@@ -93,7 +93,7 @@ def test_two_flocks_that_meet_pass_each_other(kind):
     left, right = block(5, 2, 5.0), block(5, 2, 5.0) + np.array([40.0, 1.0])
     swarm = Swarm(kind(), np.vstack((left, right)), np.vstack((left + AHEAD, right - AHEAD)))
     swarm.fly(60.0)
-    assert swarm.least_distance > 1.0
+    assert swarm.min_distance > 1.0
 
 
 @pytest.mark.parametrize("kind", BEHAVIOURS)
@@ -104,8 +104,8 @@ def test_a_flock_passes_posts_without_contact(kind):
     around = Surroundings(cylinders=posts)
     swarm = Swarm(kind(), start, start + AHEAD, around)
     swarm.fly(60.0)
-    assert swarm.least_gap > 0.5
-    assert swarm.least_distance > 1.0
+    assert swarm.min_gap > 0.5
+    assert swarm.min_distance > 1.0
     # A lattice may rest before a post, where the forces of post and goal are equal.
     assert (swarm.position[:, 0] > 75.0).sum() >= 11
 

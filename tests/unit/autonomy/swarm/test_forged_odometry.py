@@ -64,8 +64,8 @@ def test_a_displaced_uav_is_believed_when_it_sends_no_other_positions():
     assert team.status["members"] == len(GRID)
 
 
-def test_positions_within_reach_are_believed_at_once():
-    """A UAV at 20 m/s with noise of decimetres, and a forger who keeps within the same limits."""
+def test_positions_within_the_limits_are_accepted_at_once():
+    """A UAV at 20 m/s with noise of decimetres, and a forger that keeps within the same limits."""
     team = flock()
     team.fly(3.0)
     for k in range(20):

@@ -16,32 +16,32 @@ def start(count, seed):
     """Birds in a box, at least 1.2 apart, nearly as dense as the starts of the paper."""
     rng = np.random.default_rng(seed)
     side = 4.7 * np.sqrt(count / 7) - 1.2
-    places = np.empty((0, 2))
+    positions = np.empty((0, 2))
     for _ in range(100_000):
         drawn = rng.uniform(0.0, side, 2)
-        if (np.linalg.norm(places - drawn, axis=1) > 1.2).all():
-            places = np.vstack((places, drawn))
-        if len(places) == count:
-            return places, rng.uniform(0.25, 0.75, (count, 2))
+        if (np.linalg.norm(positions - drawn, axis=1) > 1.2).all():
+            positions = np.vstack((positions, drawn))
+        if len(positions) == count:
+            return positions, rng.uniform(0.25, 0.75, (count, 2))
     raise AssertionError("too dense")
 
 
 def closest(positions):
-    """The least distance of two birds on their straight ways."""
-    ways = positions[:-1, None] + np.linspace(0.0, 1.0, 20)[:, None, None] * (
+    """Returns the smallest distance of two birds on their straight paths."""
+    tracks = positions[:-1, None] + np.linspace(0.0, 1.0, 20)[:, None, None] * (
         positions[1:, None] - positions[:-1, None]
     )
-    apart = np.linalg.norm(ways[:, :, :, None] - ways[:, :, None], axis=4)
+    apart = np.linalg.norm(tracks[:, :, :, None] - tracks[:, :, None], axis=4)
     return (apart + 99.0 * np.eye(positions.shape[1])).min()
 
 
 @pytest.mark.parametrize(("count", "seed"), [(8, 1), (15, 2), (30, 2), (30, 3)])
 def test_flocks_of_any_size_end_in_a_v(count, seed):
-    places, speeds = start(count, seed)
-    plan = plan_formation(places, speeds, seed, AresSettings(limits=LIMITS))
+    positions, speeds = start(count, seed)
+    plan = plan_formation(positions, speeds, seed, AresSettings(limits=LIMITS))
     assert plan.is_solved
     assert formation_fitness(plan.positions[-1], plan.velocities[-1]).cost == plan.cost <= 1e-3
-    np.testing.assert_array_equal(plan.positions[0], places)
+    np.testing.assert_array_equal(plan.positions[0], positions)
     np.testing.assert_array_equal(plan.velocities[0], speeds)
     np.testing.assert_allclose(np.diff(plan.positions, axis=0), plan.velocities[1:], atol=1e-9)
     assert closest(plan.positions) >= LIMITS.min_distance - 1e-3
@@ -51,7 +51,7 @@ def test_flocks_of_any_size_end_in_a_v(count, seed):
     assert (change <= np.minimum(size[:-1], LIMITS.max_acceleration) + 1e-9).all()
 
 
-def test_the_same_seed_gives_the_same_ways():
+def test_the_same_seed_gives_the_same_trajectories():
     first, again = (plan_formation(*start(12, 4), 5) for _ in range(2))
     np.testing.assert_array_equal(first.positions, again.positions)
 
@@ -70,17 +70,17 @@ def test_the_arms_grow_at_their_ends_and_equally():
 
 def test_a_v_that_has_lost_its_first_bird_becomes_another_one():
     rank = np.delete(np.arange(-10, 11), 10)
-    places = np.stack([BEST_ASIDE * rank, -BEST_BEHIND * np.abs(rank)], axis=1)
-    plan = plan_formation(places, np.tile([0.0, 0.7], (20, 1)), 1, AresSettings(limits=LIMITS))
+    positions = np.stack([BEST_ASIDE * rank, -BEST_BEHIND * np.abs(rank)], axis=1)
+    plan = plan_formation(positions, np.tile([0.0, 0.7], (20, 1)), 1, AresSettings(limits=LIMITS))
     assert plan.is_solved
     assert closest(plan.positions) >= LIMITS.min_distance - 1e-3
 
 
 def test_a_flock_in_which_one_cannot_move_has_no_plan():
     """A bird accelerates by at most its speed, so one that stands remains behind."""
-    places, speeds = start(9, 1)
-    speeds[np.argmin(places.sum(axis=1))] = 0.0
-    search = FormationSearch(places, speeds, settings=AresSettings(limits=LIMITS))
+    positions, speeds = start(9, 1)
+    speeds[np.argmin(positions.sum(axis=1))] = 0.0
+    search = FormationSearch(positions, speeds, settings=AresSettings(limits=LIMITS))
     while not search.is_done:
         search.advance()
     plan = search.plan()

@@ -42,8 +42,8 @@ def test_the_velocity_is_the_best_one(others, vx, vy):
     assert np.hypot(*chosen) <= LIMIT + 1e-9
     normals, offsets = [], []
     for (x, y), (ux, uy) in zip(position[1:], velocity[1:], strict=True):
-        way = SETTINGS.distance_m, SETTINGS.horizon_s, SETTINGS.step_s
-        nx, ny, change = half_plane(x, y, 1.0 - ux, -uy, *way)
+        limits = SETTINGS.distance_m, SETTINGS.horizon_s, SETTINGS.step_s
+        nx, ny, change = half_plane(x, y, 1.0 - ux, -uy, *limits)
         normals.append((nx, ny))
         offsets.append(nx + 0.5 * change)
     normals, offsets = np.array(normals), np.array(offsets)
@@ -64,7 +64,7 @@ def test_uavs_swap_across_a_circle(count):
     swarm = Swarm(Orca(), start + np.random.default_rng(1).uniform(-0.1, 0.1, (count, 2)), -start)
     swarm.fly(60.0)
     assert np.linalg.norm(swarm.position - swarm.goal, axis=1).max() < 0.5
-    assert swarm.least_distance > 1.2
+    assert swarm.min_distance > 1.2
 
 
 def test_uavs_that_are_too_near_part():
@@ -81,7 +81,7 @@ def test_uavs_at_their_goals_let_others_pass():
     swarm = Swarm(Orca(), start, goal)
     swarm.fly(22.0)
     assert np.linalg.norm(swarm.position - swarm.goal, axis=1).max() < 0.5
-    assert swarm.least_distance > 1.9
+    assert swarm.min_distance > 1.9
 
 
 def test_it_brakes_before_what_its_own_sensor_sees():

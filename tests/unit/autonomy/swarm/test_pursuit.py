@@ -22,7 +22,7 @@ def hunt(positions, pursuers=("uav1",), **parameters):
 
 
 def hunted_flock(**parameters):
-    """Nine UAVs on a way of 200 m, the pursuer 25 m behind them and 1 m/s faster than they cruise.
+    """Nine UAVs on a route of 200 m; the pursuer is 25 m behind and 1 m/s faster than they cruise.
 
     Returns the team and the statuses of the pursuit.
     """
@@ -52,7 +52,7 @@ def test_a_flock_that_flees_is_not_captured_and_one_that_does_not_is(behaviour):
     assert last(statuses)["least_distance_m"] > 5.0
     assert min(gaps) > 1.5
     assert wary.status["members"] == 9  # the hostile UAV is none, though `uavs` names it
-    assert wary.positions[:9, 0].mean() > 80.0  # it flees along its way
+    assert wary.positions[:9, 0].mean() > 80.0  # it flees along its route
 
 
 def test_a_flock_far_from_a_hostile_uav_flies_as_without_it():
@@ -111,14 +111,14 @@ def test_pursuers_of_the_same_uav_do_not_touch_each_other():
         pursuers=["uav1", "uav2"],
         capture_m=0.5,
     )
-    least = np.inf
+    nearest = np.inf
     for _ in range(75):
         team.fly(0.2)
-        least = min(least, np.linalg.norm(team.positions[0] - team.positions[1]))
+        nearest = min(nearest, np.linalg.norm(team.positions[0] - team.positions[1]))
         if team.status["captured"]:
             break
     assert team.status["captured"] == ["uav3"]
-    assert least > 1.5
+    assert nearest > 1.5
 
 
 def test_pursuers_that_have_not_taken_off_are_waited_for():

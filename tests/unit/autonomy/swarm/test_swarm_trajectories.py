@@ -31,7 +31,7 @@ def test_uavs_swap_across_a_circle(count):
     swarm = Swarm(Trajectories(), *circle(count))
     swarm.fly(60.0)
     assert np.linalg.norm(swarm.position - swarm.goal, axis=1).max() < 0.5
-    assert swarm.least_distance > 1.5
+    assert swarm.min_distance > 1.5
 
 
 def test_committed_trajectories_keep_apart_at_all_times():
@@ -54,13 +54,13 @@ def test_a_uav_alone_flies_at_its_preferred_speed():
     assert abs(swarm.position[0, 1]) < 0.1
 
 
-def test_a_way_that_is_blocked_ends_before_it():
+def test_a_path_that_is_blocked_ends_before_the_obstacle():
     """A wall of posts without a gap: the UAV stands, and does not touch it."""
     y = np.arange(-30.0, 30.5, 0.5)
     posts = np.column_stack([np.full_like(y, 15.0), y, np.full_like(y, 0.3)])
     swarm = Swarm(Trajectories(), [[0.0, 0.0]], [[30.0, 0.0]], Surroundings(cylinders=posts))
     swarm.fly(30.0)
-    assert swarm.least_gap > 0.8
+    assert swarm.min_gap > 0.8
     assert swarm.position[0, 0] < 14.0
     assert np.hypot(*swarm.velocity[0]) < 0.5
 
@@ -73,7 +73,7 @@ def test_a_uav_that_is_displaced_gets_a_trajectory_from_there():
     now = points(swarm.behaviour, np.array([swarm.behaviour._time_s]))[:, 0]
     np.testing.assert_allclose(now[0], swarm.position[0], atol=0.5)
     swarm.fly(20.0)
-    assert swarm.least_distance > 1.5
+    assert swarm.min_distance > 1.5
 
 
 def test_a_team_that_loses_a_member_flies_on():

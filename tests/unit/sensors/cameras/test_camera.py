@@ -1,4 +1,4 @@
-"""Pictures of small scenes whose depth, shadows and labels are known."""
+"""Images of small scenes whose depth, shadows and labels are known."""
 
 import numpy as np
 import pytest
@@ -31,8 +31,8 @@ def wall(x, y0=-50.0, y1=50.0, z0=0.0, z1=40.0):
 
 
 @pytest.fixture
-def picture():
-    """Take a picture from `position`, looking along x but for `rpy` (rad)."""
+def render():
+    """Render an image from `position`, looking along x but for `rpy` (rad)."""
     scenes = []
 
     def shoot(model, position=(0.0, 0.0, 2.0), rpy=(0, 0, 0), *, solids=(), light=NOON, **options):
@@ -48,18 +48,18 @@ def picture():
         scene.close()
 
 
-def test_depth_of_a_wall_is_its_distance_along_the_axis(picture):
-    seen = picture(SMALL, (0.0, 0.0, 20.0), solids=[wall(12.0)])
+def test_depth_of_a_wall_is_its_distance_along_the_axis(render):
+    seen = render(SMALL, (0.0, 0.0, 20.0), solids=[wall(12.0)])
     np.testing.assert_allclose(seen.depth[0], 12.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("distortion", [(0.0,) * 5, (-0.2, 0.05, 0.003, -0.002, 0.01)])
-def test_depth_of_the_ground_against_analytic_rays(picture, distortion):
+def test_depth_of_the_ground_against_analytic_rays(render, distortion):
     """Each pixel's depth puts its point on the ground, within a millimetre."""
     model = CameraModel(width=80, height=60, distortion=distortion)
     pitch = np.radians(35.0)
     turn = rotations.from_rpy(0.0, pitch, 0.4)
-    seen = picture(model, (3.0, -2.0, 6.0), (0.0, pitch, 0.4))
+    seen = render(model, (3.0, -2.0, 6.0), (0.0, pitch, 0.4))
     v, u = np.mgrid[0:60, 0:80]
     depth = seen.depth[0].astype(np.float64)
     ideal = undistort((np.stack([u, v], -1) - model.centre_px) / model.focal_px, distortion)
@@ -69,10 +69,10 @@ def test_depth_of_the_ground_against_analytic_rays(picture, distortion):
     np.testing.assert_allclose(points[..., 2], 0.0, atol=1e-3)
 
 
-def test_where_objects_stand_they_are_seen(picture):
-    """A post right of the axis is right in the picture, at the column of the model's formula."""
+def test_where_objects_stand_they_are_seen(render):
+    """A post right of the axis is right in the image, at the column of the model's formula."""
     post = wall(10.0, y0=-3.1, y1=-2.9)
-    seen = picture(SMALL, (0.0, 0.0, 10.0), solids=[post])
+    seen = render(SMALL, (0.0, 0.0, 10.0), solids=[post])
     columns = np.flatnonzero(seen.material[0][24] == Material.WALL)
     wanted = SMALL.project([3.0, 0.0, 10.0])[0]
     assert abs(columns.mean() - wanted) <= 0.5
@@ -82,23 +82,23 @@ def test_where_objects_stand_they_are_seen(picture):
     assert (seen.instance[0][sky] == -1).all()
 
 
-def test_too_near_and_too_far(picture):
+def test_too_near_and_too_far(render):
     near = CameraModel(width=16, height=16, near_m=3.0, far_m=20.0)
-    assert (picture(near, (0, 0, 20.0), solids=[wall(2.0)]).depth == -np.inf).all()
-    beyond = picture(near, (0.0, 0.0, 20.0), solids=[wall(20.1)])
+    assert (render(near, (0, 0, 20.0), solids=[wall(2.0)]).depth == -np.inf).all()
+    beyond = render(near, (0.0, 0.0, 20.0), solids=[wall(20.1)])
     assert (beyond.depth == np.inf).all()
     assert (beyond.instance == -1).all()
-    at_the_end = picture(near, (0.0, 0.0, 20.0), solids=[wall(19.9)])
+    at_the_end = render(near, (0.0, 0.0, 20.0), solids=[wall(19.9)])
     np.testing.assert_allclose(at_the_end.depth, 19.9, atol=1e-3)  # in the corners too
 
 
-def test_shadows_fall_away_from_the_sun(picture):
+def test_shadows_fall_away_from_the_sun(render):
     """A wall between sun and ground darkens the ground behind it, and only there."""
     down = CameraModel(width=40, height=40, horizontal_fov_deg=40.0)
     low = make_light(sun_elevation_deg=45.0, sun_azimuth_deg=90.0)  # in the east: +x
     blind = wall(5.0, z0=0.0, z1=4.0)  # its shadow reaches from x = 5 to x = 1
-    plain = picture(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low).colour[0].astype(float)
-    dark = picture(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low, solids=[blind])
+    plain = render(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low).colour[0].astype(float)
+    dark = render(down, (0.0, 0.0, 20.0), (0, np.pi / 2, 0), light=low, solids=[blind])
     ratio = dark.colour[0].astype(float).sum(-1) / plain.sum(-1)
     ahead = 20.0 * -(np.arange(40) - 19.5) / down.focal_px  # rows are x, ahead is up
     shaded, lit = (ahead > 1.3) & (ahead < 4.7), (ahead < 0.7)
@@ -107,9 +107,9 @@ def test_shadows_fall_away_from_the_sun(picture):
 
 
 @pytest.mark.parametrize(
-    ("elevation_deg", "reach_m"), [(30.0, 10.0 / np.tan(np.pi / 6)), (50.0, 0)]
+    ("elevation_deg", "length_m"), [(30.0, 10.0 / np.tan(np.pi / 6)), (50.0, 0)]
 )
-def test_a_ridge_throws_a_shadow_unless_the_sun_is_above_its_slope(elevation_deg, reach_m):
+def test_a_ridge_throws_a_shadow_unless_the_sun_is_above_its_slope(elevation_deg, length_m):
     """A ridge of 10 m with slopes of 45 degrees; the sun is in the east, +x."""
     heights = np.zeros((13, 13))
     heights[:, 6] = 10.0
@@ -120,50 +120,50 @@ def test_a_ridge_throws_a_shadow_unless_the_sun_is_above_its_slope(elevation_deg
     light = make_light(sun_elevation_deg=elevation_deg, sun_azimuth_deg=90.0)
     seen = take(scene, down, light, batch, history)
     scene.close()
-    # the picture's top shows what lies ahead of the UAV's belly: +x
+    # the image's top shows what lies ahead of the UAV's belly: +x
     up = -(np.arange(41) - down.centre_px[1]) / down.focal_px
     x = -20.0 + up[:, None] * seen.depth[0]
     level = x < -10.5
     brightness = seen.colour[0].astype(float).sum(axis=-1)
-    dark = level & (x > -reach_m + 0.5)
-    bright = level & (x < -reach_m - 0.5)
+    dark = level & (x > -length_m + 0.5)
+    bright = level & (x < -length_m - 0.5)
     assert bright.any()
-    if reach_m:
+    if length_m:
         assert dark.any()
         assert brightness[dark].max() < brightness[bright].min()
     else:
         assert brightness[level].min() > 0.6 * brightness[level].max()
 
 
-def test_night_is_dark_and_fog_hides(picture):
-    day = picture(SMALL, solids=[wall(30.0)]).colour.mean()
+def test_night_is_dark_and_fog_hides(render):
+    day = render(SMALL, solids=[wall(30.0)]).colour.mean()
     night = make_light(sun_elevation_deg=-20.0)
-    assert picture(SMALL, solids=[wall(30.0)], light=night).colour.mean() < 0.5 * day
+    assert render(SMALL, solids=[wall(30.0)], light=night).colour.mean() < 0.5 * day
     fog = make_light(visibility_m=30.0)
     rows = slice(10, 20)
-    clear = picture(SMALL, solids=[wall(30.0)]).colour[0][rows].astype(float)
-    misty = picture(SMALL, solids=[wall(30.0)], light=fog).colour[0][rows].astype(float)
+    clear = render(SMALL, solids=[wall(30.0)]).colour[0][rows].astype(float)
+    misty = render(SMALL, solids=[wall(30.0)], light=fog).colour[0][rows].astype(float)
     horizon = 255.0 * (1.055 * fog.horizon ** (1 / 2.4) - 0.055)
     assert np.abs(misty - horizon).mean() < 0.3 * np.abs(clear - horizon).mean()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 5), (17, 2), (64, 48)])
 @pytest.mark.parametrize("samples", [1, 4])
-def test_any_size_is_filled(picture, size, samples):
+def test_any_size_is_filled(render, size, samples):
     model = CameraModel(width=size[0], height=size[1], samples=samples)
-    seen = picture(model, (0.0, 0.0, 20.0), solids=[wall(12.0)])
+    seen = render(model, (0.0, 0.0, 20.0), solids=[wall(12.0)])
     assert seen.colour.shape == (1, size[1], size[0], 3)
     np.testing.assert_allclose(seen.depth, 12.0, atol=1e-2)
     assert (seen.material == Material.WALL).all()
     assert (seen.colour > 0).all()
 
 
-def test_more_samples_smooth_an_edge(picture):
-    """Four samples are nearer to the mean of an eight times finer picture than one."""
+def test_more_samples_smooth_an_edge(render):
+    """Four samples are nearer to the mean of an eight times finer image than one."""
 
     def shot(size, samples):
         model = CameraModel(width=size, height=size, samples=samples)
-        seen = picture(model, (0, 0, 20.0), (0.3, 0, 0), solids=[wall(10.0, y1=0.0)])
+        seen = render(model, (0, 0, 20.0), (0.3, 0, 0), solids=[wall(10.0, y1=0.0)])
         return seen.colour[0].astype(float)
 
     fine = shot(512, 4).reshape(64, 8, 64, 8, 3).mean((1, 3))
@@ -171,18 +171,18 @@ def test_more_samples_smooth_an_edge(picture):
     assert off[4] < 0.6 * off[1]
 
 
-def test_only_what_is_wanted_is_made(picture):
-    seen = picture(SMALL, parts=("depth",))
+def test_only_what_is_wanted_is_made(render):
+    seen = render(SMALL, parts=("depth",))
     assert seen.colour is None
     assert seen.material is None
     assert seen.depth is not None
 
 
-def test_threads_change_nothing(picture):
+def test_threads_change_nothing(render):
     workers = Workers(3)
     model = CameraModel(width=320, height=240, samples=4)
-    one = picture(model, solids=[wall(8.0, y1=2.0)])
-    three = picture(model, solids=[wall(8.0, y1=2.0)], workers=workers)
+    one = render(model, solids=[wall(8.0, y1=2.0)])
+    three = render(model, solids=[wall(8.0, y1=2.0)], workers=workers)
     workers.close()
     for a, b in zip(one, three, strict=True):
         np.testing.assert_array_equal(a, b)
@@ -229,12 +229,12 @@ def test_a_rolling_shutter_leans(two):
     assert middles[1] - middles[0] > 4.0 + abs(upright[1] - upright[0])
 
 
-def test_noise_has_the_stated_size(picture):
+def test_noise_has_the_stated_size(render):
     numbers = {"read_noise": 0.01, "shot_noise": 0.04, "depth_noise_per_m": 0.002}
     exact = CameraModel(width=128, height=128, horizontal_fov_deg=5.0)
     noisy = exact.model_copy(update=numbers)
-    place = {"position": (0.0, 0.0, 20.0), "solids": [wall(10.0)]}
-    sound, seen = picture(exact, **place), picture(noisy, **place)
+    scene = {"position": (0.0, 0.0, 20.0), "solids": [wall(10.0)]}
+    sound, seen = render(exact, **scene), render(noisy, **scene)
     off = seen.depth - sound.depth
     assert off.std() == pytest.approx(0.002 * 10.0**2, rel=0.03)
     assert abs(off.mean()) < 0.01
@@ -256,10 +256,10 @@ def test_a_changed_model_has_rays_of_its_own():
     assert other.ideal.shape == (8, 32, 2)
 
 
-def test_noisy_depth_is_a_depth(picture):
+def test_noisy_depth_is_a_depth(render):
     """1/z = .0125 at 80 m with .004 of noise: never negative, too far where little is left."""
     model = CameraModel(width=128, height=128, horizontal_fov_deg=5.0, depth_noise_per_m=0.004)
-    depth = picture(model, (0.0, 0.0, 20.0), solids=[wall(80.0)]).depth[0]
+    depth = render(model, (0.0, 0.0, 20.0), solids=[wall(80.0)]).depth[0]
     assert depth.min() > 25.0
     assert (depth[np.isfinite(depth)] <= model.far_m).all()
     lost = np.mean(depth == np.inf)  # 1/z below 1/200: 1.875 standard deviations
@@ -273,15 +273,15 @@ def test_the_shipped_camera_loads():
 
 @pytest.mark.parametrize(("name", "far_m"), [("f450_front", 1300.0), ("f450_down", 100.0)])
 def test_the_cameras_of_the_f450_load(name, far_m):
-    """The edge of a picture with a field of view of 1 rad is half a radian off the axis."""
+    """The edge of an image with a field of view of 1 rad is half a radian off the axis."""
     model = CameraModel.load(name)
     assert (model.width, model.height, model.far_m) == (640, 480, far_m)
     edge = model.project([np.tan(0.5), 0.0, 1.0])
     np.testing.assert_allclose(edge, [639.5, 239.5], atol=1e-9)
 
 
-def test_a_uav_out_of_sight_throws_its_shadow_into_the_picture(two):
-    """From 20 m up the picture is 23 m wide; the sun is 45 degrees high in the east."""
+def test_a_uav_out_of_sight_throws_its_shadow_into_the_image(two):
+    """From 20 m up the image is 23 m wide; the sun is 45 degrees high in the east."""
     down = rotations.from_rpy(0.0, np.pi / 2, 0.0)
     light = make_light(sun_elevation_deg=45.0, sun_azimuth_deg=90.0)
     model = CameraModel(width=320, height=320)

@@ -26,7 +26,7 @@ def wall(material, look):
 
 
 @pytest.fixture
-def picture():
+def render():
     scenes = []
 
     def shoot(solid):
@@ -43,9 +43,9 @@ def picture():
         scene.close()
 
 
-def test_storeys_and_bays_show_as_dark_panes(picture):
+def test_storeys_and_bays_show_as_dark_panes(render):
     """Three storeys of 4 m: three rows of panes, a plain wall above; bays 2.6 m apart."""
-    colour, material = picture(wall(Material.FACADE, Look(storey_m=4.0, storeys=3)))
+    colour, material = render(wall(Material.FACADE, Look(storey_m=4.0, storeys=3)))
     assert (material[20:100] == Material.FACADE).all()
     green = colour[..., 1]
     height_m = 8.0 - (np.arange(120) - 59.5) * PIXEL_M
@@ -60,13 +60,13 @@ def test_storeys_and_bays_show_as_dark_panes(picture):
     assert 1.0 / bays == pytest.approx(2.6, rel=0.1)
 
 
-def test_without_storeys_a_facade_has_no_panes(picture):
-    colour, _ = picture(wall(Material.FACADE, Look()))
+def test_without_storeys_a_facade_has_no_panes(render):
+    colour, _ = render(wall(Material.FACADE, Look()))
     band = colour[40:80, :, 1]
     assert band.min() > 0.8 * band.max()
 
 
-def test_painted_solids_have_their_own_colour(picture):
-    red, material = picture(wall(Material.PAINTED, Look(colour=(0.8, 0.05, 0.05))))
+def test_painted_solids_have_their_own_colour(render):
+    red, material = render(wall(Material.PAINTED, Look(colour=(0.8, 0.05, 0.05))))
     assert (material[20:100] == Material.PAINTED).all()
     assert (red[60, :, 0] > 2.0 * red[60, :, 1]).all()

@@ -29,14 +29,14 @@ NOON = make_light(sun_elevation_deg=90.0)
 
 @pytest.fixture
 def from_above():
-    """A picture of a level F450 straight below the camera: columns are to the right, -y."""
+    """An image of a level F450 straight below the camera: columns are to the right, -y."""
     scene = Scene(Terrain.flat(200.0, origin=(-100.0, -100.0)), None)
     scene.set_bodies([body_shape(AIRFRAME)], [0, 0])
 
     def shoot(angle=None, speed=0.0, model=DOWN, light=NOON, up=20.0, **options):
         attitude = [rotations.from_rpy(0.0, np.pi / 2, 0.0), rotations.IDENTITY]
-        place = [[0.0, 0.0, up], [0.0, 0.0, up - ABOVE - HEIGHT]]
-        history = new_history(place, attitude, 1_000_000)
+        positions = [[0.0, 0.0, up], [0.0, 0.0, up - ABOVE - HEIGHT]]
+        history = new_history(positions, attitude, 1_000_000)
         batch = make_batch([0], [0], [0], [0], [0], stack_mounts([make_mount()]))
         turns = None
         if angle is not None:
@@ -47,17 +47,17 @@ def from_above():
     scene.close()
 
 
-def rotor_pixels(seen, place):
+def rotor_pixels(seen, rotor):
     """Where a rotor is seen, as (x, y) m from its centre."""
     rows, columns = np.nonzero(seen.material[0] == Material.ROTOR)
     x, y = (199.5 - rows) * PIXEL, (199.5 - columns) * PIXEL
-    dx, dy = x - place.position_m[0], y - place.position_m[1]
+    dx, dy = x - rotor.position_m[0], y - rotor.position_m[1]
     near = np.hypot(dx, dy) < 1.05 * RADIUS
     return dx[near], dy[near]
 
 
 def direction(dx, dy):
-    """Angle of the line along which points lie most, rad, from -pi/2 to pi/2."""
+    """Angle of the main axis of points, rad, from -pi/2 to pi/2."""
     values, vectors = np.linalg.eigh(np.cov(dx, dy))
     assert values[1] > 10.0 * values[0]
     return np.arctan(vectors[1, 1] / vectors[0, 1])
@@ -67,19 +67,21 @@ def direction(dx, dy):
 def test_blades_lie_at_the_angle_of_the_rotor(from_above, angle):
     """Each rotor by its sense of rotation, from where it stands at angle 0."""
     still, turned = from_above(0.0), from_above(angle)
-    for place in AIRFRAME.rotors.places:
-        sense = 1.0 if place.direction == "ccw" else -1.0
-        begun, now = (direction(*rotor_pixels(seen, place)) for seen in (still, turned))
+    for rotor in AIRFRAME.rotors.places:
+        sense = 1.0 if rotor.direction == "ccw" else -1.0
+        begun, now = (direction(*rotor_pixels(seen, rotor)) for seen in (still, turned))
         off = (now - begun - sense * angle + np.pi / 2) % np.pi - np.pi / 2
         assert abs(off) < 0.03
 
 
 def test_blades_reach_to_the_tip_and_fill_a_tenth_of_the_disc(from_above):
-    place = AIRFRAME.rotors.places[0]
-    discs, blades = (rotor_pixels(from_above(angle), place) for angle in (None, 0.7))
-    share = len(blades[0]) / len(discs[0])
+    rotor = AIRFRAME.rotors.places[0]
+    discs, blades = (rotor_pixels(from_above(angle), rotor) for angle in (None, 0.7))
+    fraction = len(blades[0]) / len(discs[0])
     # By the shape: (mean chord x 2 blades x length + hub) / disc, arms below hide nothing.
-    assert share == pytest.approx((2 * 0.16 - 2 * 0.12 * 0.214 + np.pi * 0.12**2) / np.pi, rel=0.1)
+    assert fraction == pytest.approx(
+        (2 * 0.16 - 2 * 0.12 * 0.214 + np.pi * 0.12**2) / np.pi, rel=0.1
+    )
     assert np.hypot(*blades).max() == pytest.approx(RADIUS, abs=2 * PIXEL)
 
 
@@ -98,14 +100,14 @@ def test_what_is_below_is_seen_between_the_blades(from_above):
 
 
 def test_blades_turn_while_a_rolling_shutter_reads(from_above):
-    """Each tile of four rows is that of a still picture at its own time."""
+    """Each tile of four rows is that of a still image at its own time."""
     model = DOWN.model_copy(update={"readout_s": 0.02})
     rate = np.pi / 0.02  # half a turn
     seen = from_above(0.3, rate, model=model, parts=("labels",)).material[0]
     for row in (120, 200, 280):
-        share = (row + 1.5) / 399
+        fraction = (row + 1.5) / 399
         tile = slice(row, row + 4)
-        still = from_above(0.3 + np.pi * share, parts=("labels",)).material[0]
+        still = from_above(0.3 + np.pi * fraction, parts=("labels",)).material[0]
         begun = from_above(0.3, parts=("labels",)).material[0]
         assert (seen[tile] != still[tile]).sum() <= 8
         if (still[tile] == Material.ROTOR).any():
@@ -149,7 +151,7 @@ def test_rotors_turn_by_their_speed_however_a_run_is_sliced(simulate):
 
 
 def test_a_camera_of_a_simulation_sees_blades(simulate):
-    """Two pictures of a hovering UAV differ in its rotors, and show much behind them."""
+    """Two images of a hovering UAV differ in its rotors, and show much behind them."""
     camera = {"kind": "camera", "rpy_deg": [0.0, 90.0, 0.0], "noise": False}
     camera |= {"width": 160, "height": 160, "horizontal_fov_deg": 40.0}
     data = {
@@ -161,13 +163,13 @@ def test_a_camera_of_a_simulation_sees_blades(simulate):
         ],
     }
     simulation = simulate(data)
-    pictures = []
+    images = []
     simulation.graph.subscribe(
         "/uav1/camera/labels/material",
-        lambda m: pictures.append(np.asarray(m.message.data).reshape(160, 160) == Material.ROTOR),
+        lambda m: images.append(np.asarray(m.message.data).reshape(160, 160) == Material.ROTOR),
     )
     simulation.run(0.35)
     discs = 4 * np.pi * (RADIUS * 160 / (2 * np.tan(np.radians(20.0))) / 2.9) ** 2
-    for picture in pictures:
-        assert 0.04 * discs < picture.sum() < 0.3 * discs
-    assert (pictures[1] & ~pictures[2]).sum() > 0.3 * pictures[1].sum()
+    for image in images:
+        assert 0.04 * discs < image.sum() < 0.3 * discs
+    assert (images[1] & ~images[2]).sum() > 0.3 * images[1].sum()

@@ -52,7 +52,7 @@ def depth_of(message):
     return np.asarray(message.data).view("<f4").reshape(message.height, message.width)
 
 
-def test_a_flat_thing_is_shifted_by_its_disparity(look):
+def test_a_flat_object_is_shifted_by_its_disparity(look):
     """The plates of the UAV ahead show their fronts, 2.78 m before the cameras."""
     got = look(facing())
     middle = {}
@@ -69,7 +69,7 @@ def test_a_flat_thing_is_shifted_by_its_disparity(look):
     assert abs(row) < 0.1
 
 
-def test_intrinsics_tell_the_baseline_in_the_frame_of_the_left_camera(look):
+def test_intrinsics_hold_the_baseline_in_the_frame_of_the_left_camera(look):
     got = look(facing())
     left, right = got["left/camera_info"], got["right/camera_info"]
     assert left.header == right.header == got["right/image_raw"].header
@@ -82,13 +82,13 @@ def test_intrinsics_tell_the_baseline_in_the_frame_of_the_left_camera(look):
     point = np.array([0.4, -0.2, 5.0, 1.0])  # of the left camera
     seen = [(m @ point)[:2] / 5.0 for m in (left.p.reshape(3, 4), right.p.reshape(3, 4))]
     np.testing.assert_allclose(seen[0] - seen[1], [right.k[0] * BASELINE / 5.0, 0.0], atol=1e-9)
-    places = {
+    mounts = {
         t.child_frame_id: (t.header.frame_id, t.transform.translation) for t in got["tf"].transforms
     }
     for side, y in (("left", 0.1), ("right", -0.1)):
-        parent, place = places[f"uav1/stereo/{side}"]
+        parent, position = mounts[f"uav1/stereo/{side}"]
         assert parent == "uav1/base_link"
-        assert (place.x, place.y, place.z) == pytest.approx((0.1, y, 0.05))
+        assert (position.x, position.y, position.z) == pytest.approx((0.1, y, 0.05))
 
 
 def block_matching():
@@ -105,7 +105,7 @@ def semi_global():
 
 @pytest.mark.parametrize(("matcher", "ground"), [(block_matching, True), (semi_global, False)])
 def test_opencv_finds_the_depth_of_a_wood(look, wood_data, matcher, ground):
-    """Of trees; and of ground where a matcher tells smooth ground from what it can match."""
+    """Of trees; and of ground, where a matcher finds matches except on smooth ground."""
     entry = {**PAIR, "points": "xyz", "rpy_deg": [0.0, -10.0, 0.0]}
     wood_data["types"]["surveyor"] = {"sensors": [entry]}
     wood_data["uavs"] = [

@@ -1,11 +1,11 @@
-"""Light, haze, rain and snow in pictures, against Koschmieder's law and counts of particles."""
+"""Light, haze, rain and snow in images, against Koschmieder's law and counts of particles."""
 
 import math
 
 import numpy as np
 import pytest
 from scipy import integrate
-from test_camera import NOON, SMALL, picture, wall
+from test_camera import NOON, SMALL, render, wall
 
 from volery.core.workers import Workers
 from volery.sensors.cameras.camera import _linear
@@ -16,7 +16,7 @@ from volery.sensors.cameras.weather_light import LightOfTheHour, light_in
 from volery.world.materials import Material
 from volery.world.weather import CLEAR_AIR, Particles, Weather
 
-__all__ = ["picture"]
+__all__ = ["render"]
 RAIN = Weather(particles=Particles(rain_mm_h=40.0))
 SNOW = Weather(particles=Particles(snow_mm_h=4.0))
 PLAIN = {"read_noise": 0.0, "shot_noise": 0.0}
@@ -35,17 +35,17 @@ def test_clear_air_leaves_the_light_alone():
 @pytest.mark.parametrize(
     "particles", [Particles(fog_visibility_m=60.0), Particles(dust_visibility_m=90.0)]
 )
-def test_contrast_fades_as_koschmieder_says(picture, particles):
+def test_contrast_fades_as_koschmieder_says(render, particles):
     """What a wall differs from the haze by falls off with exp(-a d)."""
     light = light_in(make_light(40.0, visibility_m=1e6), particles)
     haze = np.minimum(light.horizon, 1.0)
-    shares = []
+    contrasts = []
     for distance in (5.0, 15.0, 30.0):
-        seen = picture(SMALL, (0.0, 0.0, 20.0), solids=[wall(distance)], light=light)
-        shares.append((light_of(seen.colour[0, 20:28, 28:36]).mean(axis=(0, 1)) - haze)[0])
+        seen = render(SMALL, (0.0, 0.0, 20.0), solids=[wall(distance)], light=light)
+        contrasts.append((light_of(seen.colour[0, 20:28, 28:36]).mean(axis=(0, 1)) - haze)[0])
     a = math.log(20.0) / particles.visibility_m
-    assert shares[1] / shares[0] == pytest.approx(math.exp(-a * 10.0), rel=0.1)
-    assert shares[2] / shares[0] == pytest.approx(math.exp(-a * 25.0), rel=0.15)
+    assert contrasts[1] / contrasts[0] == pytest.approx(math.exp(-a * 10.0), rel=0.1)
+    assert contrasts[2] / contrasts[0] == pytest.approx(math.exp(-a * 25.0), rel=0.15)
 
 
 @pytest.mark.parametrize("weather", [RAIN, SNOW], ids=["rain", "snow"])
@@ -99,28 +99,28 @@ def white(weather, light):
 
 @pytest.mark.parametrize("exposure_s", [5e-4, 5e-3])
 @pytest.mark.parametrize("weather", [RAIN, SNOW], ids=["rain", "snow"])
-def test_light_of_what_falls_is_that_of_its_cross_section(picture, weather, exposure_s):
+def test_light_of_what_falls_is_that_of_its_cross_section(render, weather, exposure_s):
     """On the mean a pixel shows the cross-section of all that is in its view, at any exposure."""
     light = black_light()
     (kind,) = white(weather, light)
     model = CameraModel(width=320, height=240, exposure_time_s=exposure_s)
-    number = kind.cell_m**-3.0 * kind.slope * math.exp(kind.slope * kind.least_mm)
+    number = kind.cell_m**-3.0 * kind.slope * math.exp(kind.slope * kind.min_mm)
 
     def area(diameter):
         return number * math.exp(-kind.slope * diameter) * math.pi / 4.0 * (1e-3 * diameter) ** 2
 
-    share = integrate.quad(area, kind.least_mm, kind.least_mm + 11.8 / kind.slope)[0]
-    share *= kind.reach_m - 0.3
-    seen = picture(model, (0.0, 0.0, 50.0), (0.0, -0.3, 0.0), light=light, falling=(kind,))
-    assert light_of(seen.colour).mean() == pytest.approx(share, rel=0.15)
+    fraction = integrate.quad(area, kind.min_mm, kind.min_mm + 11.8 / kind.slope)[0]
+    fraction *= kind.max_range_m - 0.3
+    seen = render(model, (0.0, 0.0, 50.0), (0.0, -0.3, 0.0), light=light, falling=(kind,))
+    assert light_of(seen.colour).mean() == pytest.approx(fraction, rel=0.15)
 
 
-def test_longer_exposures_leave_longer_and_fainter_streaks(picture):
+def test_longer_exposures_leave_longer_and_fainter_streaks(render):
     light = black_light()
     brightest, lit = [], []
     for exposure_s in (2e-4, 2e-3, 2e-2):
         model = CameraModel(width=320, height=240, exposure_time_s=exposure_s)
-        seen = picture(model, (0.0, 0.0, 50.0), light=light, falling=white(RAIN, light))
+        seen = render(model, (0.0, 0.0, 50.0), light=light, falling=white(RAIN, light))
         colour = light_of(seen.colour[0, ..., 0])
         brightest.append(np.quantile(colour[colour > 0.0], 0.99))
         lit.append((colour > 0.0).mean())
@@ -128,31 +128,31 @@ def test_longer_exposures_leave_longer_and_fainter_streaks(picture):
     assert lit[0] < lit[1] < lit[2]
 
 
-def test_nothing_falls_before_what_is_nearer(picture):
+def test_nothing_falls_before_what_is_nearer(render):
     light = light_in(NOON, SNOW.particles)
     falling = falling_in(SNOW, light)
-    behind = picture(SMALL, solids=[wall(0.29)], light=light, falling=falling)
-    plain = picture(SMALL, solids=[wall(0.29)], light=light)
+    behind = render(SMALL, solids=[wall(0.29)], light=light, falling=falling)
+    plain = render(SMALL, solids=[wall(0.29)], light=light)
     np.testing.assert_array_equal(behind.colour, plain.colour)
-    before = picture(SMALL, solids=[wall(6.0)], light=light, falling=falling)
-    assert (before.colour != picture(SMALL, solids=[wall(6.0)], light=light).colour).any()
+    before = render(SMALL, solids=[wall(6.0)], light=light, falling=falling)
+    assert (before.colour != render(SMALL, solids=[wall(6.0)], light=light).colour).any()
 
 
-def test_depth_and_labels_know_nothing_of_the_weather(picture):
+def test_depth_and_labels_know_nothing_of_the_weather(render):
     light = light_in(NOON, SNOW.particles)
     falling = falling_in(SNOW, light)
-    snowy, clear = picture(SMALL, light=light, falling=falling), picture(SMALL)
+    snowy, clear = render(SMALL, light=light, falling=falling), render(SMALL)
     np.testing.assert_array_equal(snowy.depth, clear.depth)
     np.testing.assert_array_equal(snowy.material, clear.material)
-    alone = picture(SMALL, light=light, falling=falling, parts=("colour",))
+    alone = render(SMALL, light=light, falling=falling, parts=("colour",))
     assert alone.depth is None
     np.testing.assert_array_equal(alone.colour, snowy.colour)
 
 
-def test_pictures_do_not_depend_on_threads(picture):
+def test_images_do_not_depend_on_threads(render):
     light = light_in(NOON, SNOW.particles)
-    pictures = [
-        picture(SMALL, light=light, falling=falling_in(SNOW, light), workers=Workers(n)).colour
+    images = [
+        render(SMALL, light=light, falling=falling_in(SNOW, light), workers=Workers(n)).colour
         for n in (1, 3)
     ]
-    np.testing.assert_array_equal(*pictures)
+    np.testing.assert_array_equal(*images)

@@ -77,19 +77,19 @@ def test_solids_are_closed_and_hold_area_times_height(helsinki):
 
 
 def test_rays_meet_walls_where_the_polygons_are(helsinki, scene):
-    """From street places, level rays: within a millimetre of shapely's distance to the outlines."""
+    """Level rays from streets: within a millimetre of shapely's distance to the outlines."""
     walls = shapely.union_all([building.outline.footprint for building in helsinki.buildings])
     angles = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     checked = 0
     for lamp in helsinki.lamps[[10, 150, 300]]:
         x, y = (lamp[:2] + 2.5 * lamp[2:]).tolist()
         assert not walls.contains(shapely.Point(x, y))
-        ways = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(60)])
-        hits = scene.cast(np.tile([x, y, GROUND_M + 2.0], (60, 1)), ways, 200.0)
-        for way, distance, instance, material in zip(
-            ways, hits.distance, hits.instance, hits.material, strict=True
+        directions = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(60)])
+        hits = scene.cast(np.tile([x, y, GROUND_M + 2.0], (60, 1)), directions, 200.0)
+        for offset, distance, instance, material in zip(
+            directions, hits.distance, hits.instance, hits.material, strict=True
         ):
-            beam = shapely.LineString([(x, y), (x + 200.0 * way[0], y + 200.0 * way[1])])
+            beam = shapely.LineString([(x, y), (x + 200.0 * offset[0], y + 200.0 * offset[1])])
             wanted = beam.intersection(walls.boundary).distance(shapely.Point(x, y))
             if "lamp" in scene.instance_name(int(instance)) or not math.isfinite(wanted):
                 continue
@@ -143,12 +143,12 @@ def test_lamps_and_trees_stand_apart_in_streets(helsinki):
     assert min(len(lamps), len(trees)) > 300
     assert shapely.distance(walls, shapely.points(lamps)).min() > 2.0
     assert shapely.distance(walls, shapely.points(trees)).min() > 4.0
-    way = 1.5 * helsinki.lamps[:, 2:]  # of the arm: over the street, off the walls
-    ahead, behind = (shapely.distance(walls, shapely.points(lamps + k * way)) for k in (1, -1))
+    offset = 1.5 * helsinki.lamps[:, 2:]  # of the arm: over the street, off the walls
+    ahead, behind = (shapely.distance(walls, shapely.points(lamps + k * offset)) for k in (1, -1))
     assert (ahead > behind).all()
-    for places, least in ((lamps, 0.6 * 28.0), (trees, 0.35 * 11.0)):
-        apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-        assert apart[np.triu_indices(len(places), 1)].min() >= least - 1e-9
+    for positions, min_distance in ((lamps, 0.6 * 28.0), (trees, 0.35 * 11.0)):
+        apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
+        assert apart[np.triu_indices(len(positions), 1)].min() >= min_distance - 1e-9
 
 
 def test_the_same_seed_makes_the_same_city(helsinki, terrain):

@@ -1,4 +1,4 @@
-"""Outlines are read, mended or refused; every one that needed something is told by id."""
+"""Outlines are read, mended or refused; every one that needed something is reported by id."""
 
 import json
 import math
@@ -11,7 +11,7 @@ from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.world.city.geojson import read_features
 from volery.world.city.heights import HeightRule, height_of
-from volery.world.city.outlines import LEAST_AREA_M2, read_outlines
+from volery.world.city.outlines import MIN_AREA_M2, read_outlines
 from volery.world.city.tags import tags_of
 
 FRAME = LocalFrame.from_degrees(60.0, 25.0, 0.0)
@@ -49,8 +49,8 @@ def test_a_square_becomes_itself(read):
     (outline,), report = read(feature(square(20.0, -30.0)))
     assert outline.footprint.area == pytest.approx(100.0, rel=1e-6)
     np.testing.assert_allclose(outline.footprint.bounds, (20, -30, 30, -20), atol=1e-6)
-    told = "town.geojson: 1 building of 1 outline; 1 has no height and gets the default"
-    assert report.summary() == told
+    summary = "town.geojson: 1 building of 1 outline; 1 has no height and gets the default"
+    assert report.summary() == summary
     _, report = read(feature(square(20.0, -30.0), height=12))
     assert report.summary() == "town.geojson: 1 building of 1 outline"
 
@@ -72,15 +72,15 @@ def test_several_polygons_are_one_building(read):
     assert outline.footprint.area == pytest.approx(200.0, rel=1e-6)
 
 
-def test_open_and_crossed_outlines_are_mended_and_told(read):
+def test_open_and_crossed_outlines_are_repaired_and_reported(read):
     bow_tie = [[0, 0], [10, 10], [10, 0], [0, 10], [0, 0]]  # two triangles of 25 m2
     outlines, report = read(
         feature(square(100.0)[:-1], own="open"), feature(bow_tie, own="crossed")
     )
     assert [round(o.footprint.area, 3) for o in outlines] == [100.0, 50.0]
-    told = dict(report.repaired)
-    assert "closed" in told["open"]
-    assert "self-intersection" in told["crossed"]
+    repairs = dict(report.repaired)
+    assert "closed" in repairs["open"]
+    assert "self-intersection" in repairs["crossed"]
     assert "repaired crossed" in str(report)
 
 
@@ -93,7 +93,7 @@ def test_what_is_no_building_is_dropped_with_the_reason(read):
         feature(square(), own="twin"),
         feature(square(2.0, 2.0, 3.0), own="inside", height=5),
         feature(square(5.0, 5.0, 3.0), own="tower", height=50),
-        feature(square(70.0, side=0.9 * math.sqrt(LEAST_AREA_M2)), own="speck"),
+        feature(square(70.0, side=0.9 * math.sqrt(MIN_AREA_M2)), own="speck"),
         feature([[0, 0], [40, 0], [0, 0]], own="thread"),
         line,
         nothing,
@@ -220,7 +220,7 @@ def test_heights(properties, height_m, storeys, source):
         "12-14",
     ],
 )
-def test_heights_not_understood_are_told(read, height):
+def test_heights_not_understood_are_reported(read, height):
     (outline,), report = read(feature(square(), height=height))
     assert outline.height.height_m == 10.0
     assert "is no length" in dict(report.guessed)["b"]

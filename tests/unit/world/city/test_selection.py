@@ -182,7 +182,7 @@ def test_what_hangs_in_the_air_is_open_below(write, tags, low_m, high_m):
         assert inside >= 0
 
 
-def test_a_lower_side_above_the_roof_is_told(read):
+def test_a_lower_side_above_the_roof_is_reported(read):
     (outline,), report = read(feature(0.0, {"height": 6, "min_height": 8}))
     assert outline.height.base_m == 0.0
     assert report.guessed == (("at 0.0", "its lower side, 8 m, is not below its height, 6 m"),)

@@ -156,7 +156,7 @@ function SpeedFields() {
   ];
   return (
     <Group gap={6} wrap="nowrap" mt={6}>
-      {fields.map(([key, label, unit, most]) => (
+      {fields.map(([key, label, unit, max]) => (
         <NumberInput
           key={key}
           size="xs"
@@ -164,10 +164,10 @@ function SpeedFields() {
           label={label}
           suffix={` ${unit}`}
           min={0.1}
-          max={most}
+          max={max}
           step={0.5}
           value={speeds[key]}
-          onChange={(value) => setSpeeds({ [key]: Math.max(0.1, Math.min(most, Number(value))) })}
+          onChange={(value) => setSpeeds({ [key]: Math.max(0.1, Math.min(max, Number(value))) })}
         />
       ))}
     </Group>

@@ -1,4 +1,4 @@
-// Flight keys. They are heard before anybody else's, so that no view takes them while they fly.
+// Flight keys. They come before all other shortcuts, so that no view takes them in flight.
 
 import { isFlightKey, wishOfKeys, type Wish } from "../../lib/twist.ts";
 import { releaseControls, rest } from "../../state/flying.ts";
@@ -13,7 +13,7 @@ export interface KeySource {
   close: () => void;
 }
 
-/** Listen until closed. Whoever leaves the window lets all keys go, and the UAV rests. */
+/** Listen until closed. Leaving the window releases all keys, and the UAV rests. */
 export function listenToKeys(): KeySource {
   const pressed = new Set<string>();
   let fast = false;

@@ -1,4 +1,4 @@
-// UAVs that come, go and are put somewhere.
+// Spawns, removes and teleports UAVs and actors.
 
 import { RefusedError, ask, order } from "./requests.ts";
 import type { Position } from "./flight.ts";
@@ -21,13 +21,13 @@ export async function spawnables(): Promise<Spawnable[]> {
   }));
 }
 
-/** New UAVs, one at each place; names of those that came. Rejects where none did. */
-export async function spawn(uri: string, places: readonly Position[]): Promise<string[]> {
+/** New UAVs, one at each position; names of those that came. Rejects where none did. */
+export async function spawn(uri: string, positions: readonly Position[]): Promise<string[]> {
   const answer = await link.call<"simulation_interfaces/srv/SpawnEntities">(
     "/spawn_entities",
     "simulation_interfaces/srv/SpawnEntities",
     {
-      spawn_requests: places.map((position) => ({
+      spawn_requests: positions.map((position) => ({
         name: "",
         allow_renaming: true,
         entity_resource: { uri },
@@ -53,7 +53,7 @@ export async function resetUav(name: string): Promise<void> {
   await order("/volery/reset_uav", "volery_interfaces/srv/ByName", { name });
 }
 
-/** Put a UAV or a thing somewhere; pose in the map. It stands still there. */
+/** Teleport a UAV or an actor; pose in the map. It stands still there. */
 export async function putAt(
   entity: string,
   position: Position,

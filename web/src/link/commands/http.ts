@@ -4,7 +4,7 @@ import { RefusedError } from "./requests.ts";
 
 /** JSON of an answer; a refusal's reason is its `error`. */
 export async function read(answer: Response): Promise<unknown> {
-  const told = (await answer.json().catch(() => null)) as { error?: string } | null;
-  if (answer.ok && told !== null) return told;
-  throw new RefusedError(told?.error ?? `the server returned status ${answer.status}`);
+  const body = (await answer.json().catch(() => null)) as { error?: string } | null;
+  if (answer.ok && body !== null) return body;
+  throw new RefusedError(body?.error ?? `the server returned status ${answer.status}`);
 }

@@ -46,7 +46,7 @@ export async function uploadRecording(file: File): Promise<string> {
   return ((await read(answer)) as { name: string }).name;
 }
 
-/** Play a log in place of the present world; the link is made anew meanwhile. */
+/** Play a log instead of the present world; the page reconnects meanwhile. */
 export async function playRecording(name: string): Promise<void> {
   const type = "volery_interfaces/srv/PlayRecording";
   await order("/volery/play_recording", type, { name }, LONGEST_START_S);

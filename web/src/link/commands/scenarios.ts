@@ -58,7 +58,7 @@ export async function choices(): Promise<Choices> {
 /** What this page has last had flown, and with what. */
 let last: { scenario: string; changes: ScenarioChanges } | null = null;
 
-/** Build a world and fly it in place of the present one; the link is made anew meanwhile. */
+/** Build a world and fly it instead of the present one; the page reconnects meanwhile. */
 export async function loadScenario(scenario: string, changes: ScenarioChanges): Promise<void> {
   const request = { scenario, changes: JSON.stringify(changes) };
   const type = "volery_interfaces/srv/LoadScenario";
@@ -84,8 +84,8 @@ export async function upload(file: File, kind: UploadKind, image: File | null): 
   }
   const body = image === null ? file : new Blob([file, image]);
   const answer = await fetch(`./api/uploads?${query}`, { method: "POST", body });
-  const told = await read(answer);
-  return (told as { scenario: string }).scenario;
+  const response = await read(answer);
+  return (response as { scenario: string }).scenario;
 }
 
 async function get(url: string): Promise<unknown> {

@@ -1,4 +1,4 @@
-// What services and types there are, as rosapi tells.
+// What services and types there are, as rosapi reports.
 
 import type { TypeDefinition } from "../../lib/typeDefinitions.ts";
 import { link } from "../link.ts";

@@ -2,14 +2,14 @@ import { Text } from "@mantine/core";
 import { useState } from "react";
 import { ratesText } from "../../lib/rates.ts";
 import { spanText } from "../../lib/time.ts";
-import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
+import { showCamera, useLayout, type Tile } from "../../state/layout.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
 import type { CameraTopic } from "./cameraTopics.ts";
 import { useCameraImage } from "./useCameraImage.ts";
 
 const LARGE_PX = 360;
 /** Tiles side by side leave one another room in narrow scenes. */
-const MOST_SHARE = 0.25;
+const MAX_FRACTION = 0.25;
 
 /** What one camera sees, how old it is and how often it comes. */
 export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
@@ -25,17 +25,17 @@ export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile
       name={camera.name}
       title={camera.title}
       usual={usual}
-      mostShare={MOST_SHARE}
+      maxFraction={MAX_FRACTION}
       aspect={aspect}
-      onClose={() => showPicture(camera.name, false)}
+      onClose={() => showCamera(camera.name, false)}
     >
-      <canvas ref={setCanvas} className="picture" role="img" aria-label={camera.title} />
+      <canvas ref={setCanvas} className="camera-image" role="img" aria-label={camera.title} />
       {problem !== "" && (
-        <Text size="xs" c="red" className="picture-problem" role="alert">
+        <Text size="xs" c="red" className="camera-problem" role="alert">
           {problem}
         </Text>
       )}
-      <Text size="xs" className="picture-label" aria-label={`${camera.title}: rate and age`}>
+      <Text size="xs" className="camera-label" aria-label={`${camera.title}: rate and age`}>
         {ratesText(hz, simulatedHz)} · {spanText(ageS)} old
       </Text>
       {range !== null && <Legend range={range} />}
@@ -46,7 +46,7 @@ export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile
 /** What the colours of depth mean. */
 function Legend({ range: [near, far] }: { range: [number, number] }) {
   return (
-    <div className="picture-legend" aria-label={`${near.toFixed(1)} m to ${far.toFixed(1)} m`}>
+    <div className="camera-legend" aria-label={`${near.toFixed(1)} m to ${far.toFixed(1)} m`}>
       <span>{near.toFixed(1)} m</span>
       <span className="turbo" aria-hidden />
       <span>{far.toFixed(1)} m</span>

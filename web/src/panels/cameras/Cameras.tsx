@@ -1,7 +1,7 @@
 import { Menu, Paper, ActionIcon, ScrollArea, Text, Tooltip } from "@mantine/core";
 import { Images } from "lucide-react";
 import { useEffect } from "react";
-import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
+import { showCamera, useLayout, type Tile } from "../../state/layout.ts";
 import { useTopics } from "../../state/topics.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 import { cameraTopics, colourFirst, type CameraTopic } from "./cameraTopics.ts";
@@ -16,17 +16,17 @@ export default function Cameras() {
   const selected = useVehicles((vehicles) => vehicles.selected);
   const shown = cameras.filter(({ name }) => chosen.includes(name));
   const some = cameras.length > 0 && shown.length === 0;
-  // Who asks for pictures and has chosen none sees those of the selected UAV.
+  // Without a choice the tiles show cameras of the selected UAV.
   useEffect(() => {
     if (!some || useLayout.getState().pictures.length > 0) return;
     const own = cameras.filter(({ name }) => name.startsWith(`/${selected}/`));
-    for (const { name } of colourFirst(own).slice(0, FIRST_TILES)) showPicture(name, true);
+    for (const { name } of colourFirst(own).slice(0, FIRST_TILES)) showCamera(name, true);
     // oxlint-disable-next-line react-hooks/exhaustive-deps -- only when there begin to be some
   }, [some, selected]);
   return (
     <>
       {shown.map((camera, i) => (
-        <CameraTile key={camera.name} camera={camera} usual={usualPlace(i)} />
+        <CameraTile key={camera.name} camera={camera} usual={usualTile(i)} />
       ))}
       <Chooser cameras={cameras} chosen={chosen} />
     </>
@@ -34,7 +34,7 @@ export default function Cameras() {
 }
 
 /** Side by side along the bottom. */
-function usualPlace(i: number): Tile {
+function usualTile(i: number): Tile {
   return { x: Math.min(1, 0.02 + 0.35 * i), y: 0.97, width: 260 };
 }
 
@@ -43,7 +43,7 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
     <Menu position="top-end" closeOnItemClick={false} withinPortal>
       <Menu.Target>
         <Tooltip label="Select cameras" position="left">
-          <ActionIcon className="picture-chooser" size="lg" aria-label="Select cameras">
+          <ActionIcon className="camera-chooser" size="lg" aria-label="Select cameras">
             <Images size={18} />
           </ActionIcon>
         </Tooltip>
@@ -62,7 +62,7 @@ function Chooser({ cameras, chosen }: { cameras: CameraTopic[]; chosen: string[]
               <Menu.CheckboxItem
                 key={name}
                 checked={chosen.includes(name)}
-                onChange={(checked) => showPicture(name, checked)}
+                onChange={(checked) => showCamera(name, checked)}
                 closeMenuOnClick={false}
               >
                 {title}

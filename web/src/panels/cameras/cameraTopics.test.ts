@@ -22,7 +22,7 @@ it("each camera is shown once, compressed where it can be", () => {
   ]);
 });
 
-it("colours come before depth and labels, otherwise as told", () => {
+it("colours come before depth and labels, otherwise in the given order", () => {
   const names = ["/uav1/down/depth", "/uav1/down/image_raw", "/uav1/front/labels/instance"];
   names.push("/uav1/front/image_raw");
   const cameras = cameraTopics(names.map((name) => ({ name, type: IMAGE })));

@@ -3,13 +3,13 @@ import type { TopicName } from "../../link/commands/graph.ts";
 const RAW = "sensor_msgs/msg/Image";
 const COMPRESSED = "sensor_msgs/msg/CompressedImage";
 
-/** One picture that can be shown: compressed where there is a choice. */
+/** One image topic that can be shown: compressed where there is a choice. */
 export interface CameraTopic extends TopicName {
   /** `uav1 front`, `uav1 front depth`. */
   title: string;
 }
 
-/** Pictures of all cameras. `compressedDepth` is left to its raw twin, which browsers can read. */
+/** Image topics of all cameras. `compressedDepth` is left to its raw twin, which browsers can read. */
 export function cameraTopics(topics: readonly TopicName[]): CameraTopic[] {
   const compressed = new Set(
     topics.filter(({ type }) => type === COMPRESSED).map(({ name }) => name),

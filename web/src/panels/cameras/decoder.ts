@@ -1,4 +1,4 @@
-// Decodes pictures off the main thread: compressed ones by the browser, raw ones by us.
+// Decodes images off the main thread: compressed ones by the browser, raw ones by us.
 
 import { pixelsOf, type RawImage } from "../../lib/rasterImage.ts";
 

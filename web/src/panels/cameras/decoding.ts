@@ -1,6 +1,6 @@
 import type { Decoded, Order } from "./decoder.ts";
 
-/** A picture that is ready to be drawn; `bitmap` must be closed. */
+/** An image that is ready to be drawn; `bitmap` must be closed. */
 export interface Ready {
   bitmap: ImageBitmap;
   range: [number, number] | null;
@@ -12,7 +12,7 @@ let worker: Worker | null = null;
 let next = 1;
 const waiting = new Map<number, Waiting>();
 
-/** Decode one picture; rejects with the reason where it cannot be shown. */
+/** Decode one image; rejects with the reason where it cannot be shown. */
 export function decode(topic: string, image: Order["image"]): Promise<Ready> {
   worker ??= start();
   const id = next++;

@@ -10,11 +10,11 @@ import { decode } from "./decoding.ts";
 export interface CameraImageState {
   /** Width over height. */
   aspect: number;
-  /** Pictures per second of wall time ... */
+  /** Images per second of wall time ... */
   hz: number;
   /** ... and of simulated time, by their stamps. */
   simulatedHz: number;
-  /** Wall time since the picture was taken, s. */
+  /** Wall time since the image was taken, s. */
   ageS: number;
   range: [number, number] | null;
   problem: string;
@@ -29,14 +29,14 @@ const NOTHING: CameraImageState = {
   problem: "",
 };
 
-/** Small tiles are content with fewer pictures. */
+/** Small tiles are content with fewer images. */
 const LARGE_MS = 50;
 const SMALL_MS = 100;
-const TELL_MS = 500;
+const UPDATE_MS = 500;
 
-type Picture = sensor_msgs_Image | sensor_msgs_CompressedImage;
+type ImageMessage = sensor_msgs_Image | sensor_msgs_CompressedImage;
 
-/** Receive a camera's pictures while the canvas is seen, and draw them there. */
+/** Receive a camera's images while the canvas is seen, and draw them there. */
 export function useCameraImage(
   camera: CameraTopic,
   canvas: HTMLCanvasElement | null,
@@ -62,11 +62,11 @@ function receive(
 ): () => void {
   const [meter, arrivals] = [new RateMeter(), new ArrivalMeter()];
   let [busy, stampS, arrivedMs] = [false, NaN, NaN];
-  const show = async (picture: Picture) => {
+  const show = async (image: ImageMessage) => {
     if (busy) return; // the newest of those that come meanwhile is soon there
     busy = true;
     try {
-      const { bitmap, range } = await decode(topic, pixelsIn(picture));
+      const { bitmap, range } = await decode(topic, pixelsIn(image));
       draw(canvas, bitmap);
       const aspect = bitmap.width / bitmap.height;
       bitmap.close();
@@ -85,12 +85,12 @@ function receive(
     topic,
     type,
     ({ message, arrivedMs: at }) => {
-      const picture = message as Picture;
-      stampS = secondsOf(picture.header.stamp);
+      const image = message as ImageMessage;
+      stampS = secondsOf(image.header.stamp);
       arrivedMs = at;
       meter.add(stampS);
       arrivals.add(at / 1000);
-      void show(picture);
+      void show(image);
     },
     { throttleMs, depth: 1 },
   );
@@ -102,7 +102,7 @@ function receive(
         simulatedHz: meter.hz,
         ageS: ageOf(stampS, arrivedMs),
       })),
-    TELL_MS,
+    UPDATE_MS,
   );
   return () => {
     end();
@@ -117,10 +117,10 @@ function ageOf(stampS: number, arrivedMs: number): number {
 }
 
 /** Copies of the bytes alone travel to the decoder. */
-function pixelsIn(picture: Picture) {
-  const data = Uint8Array.from(picture.data as ArrayLike<number>);
-  if ("format" in picture) return { format: picture.format, data };
-  const { width, height, encoding, is_bigendian, step } = picture;
+function pixelsIn(image: ImageMessage) {
+  const data = Uint8Array.from(image.data as ArrayLike<number>);
+  if ("format" in image) return { format: image.format, data };
+  const { width, height, encoding, is_bigendian, step } = image;
   return { width, height, encoding, is_bigendian, step, data };
 }
 

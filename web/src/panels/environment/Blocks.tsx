@@ -8,7 +8,7 @@ import { useSimulation } from "../../state/simulation.ts";
 import { Section } from "../inspector/Section.tsx";
 import { FieldDials, type DialField } from "./FieldDials.tsx";
 
-/** Blocks are built anew with each change: fewer of them than of weather, ms. */
+/** Blocks are built again with each change: fewer of them than of weather, ms. */
 const SEND_MS = 250;
 
 const FIELDS: readonly DialField<"block_height" | "cell_size">[] = [

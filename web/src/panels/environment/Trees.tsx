@@ -7,7 +7,7 @@ import { useSimulation } from "../../state/simulation.ts";
 import { useWorldPlan } from "../../state/worldPlan.ts";
 import { Section } from "../inspector/Section.tsx";
 
-/** How many trees stand; another number builds the world anew. */
+/** How many trees stand; another number builds the world again. */
 export function Trees() {
   const scenario = useSimulation(({ server }) => server?.scenario);
   const trees = useWorldPlan(({ plan }) => plan?.trees.length ?? 0);

@@ -15,7 +15,7 @@ const CALM: Weather = {
   hour_of_day: 0,
 };
 
-/** Ten changes a second are as many as a hand on a slider can tell apart. */
+/** Ten changes a second are as many as a hand on a slider can distinguish. */
 const SEND_MS = 100;
 
 /** The weather that the simulation has confirmed, and how to change it. */
@@ -26,8 +26,8 @@ export function useWeather() {
   useEffect(() => {
     if (!open) return;
     getWeather()
-      .then((told) => {
-        setConfirmed(told);
+      .then((confirmed) => {
+        setConfirmed(confirmed);
         setProblem("");
       })
       .catch((error: unknown) => setProblem(`Weather is unavailable: ${reasonOf(error)}`));

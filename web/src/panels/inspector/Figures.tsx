@@ -8,7 +8,7 @@ import { baseFrame, useVehicles } from "../../state/vehicles.ts";
 import { heightAt } from "../../state/worldPlan.ts";
 import { batteryColour } from "../vehicles/modes.ts";
 
-/** Numbers of the selected UAV, as often as the vehicles are told. */
+/** Numbers of the selected UAV, as often as the vehicles are published. */
 export function Figures() {
   const vehicle = useVehicles(({ list, selected }) => list.find(({ name }) => name === selected));
   if (vehicle === undefined) return null;

@@ -10,16 +10,16 @@ import { Section } from "./Section.tsx";
 
 const AXES = ["x", "y", "z"] as const;
 
-/** Fly to a place of the map: by numbers or by a click. */
+/** Fly to a position in the map: by numbers or by a click. */
 export function GoTo({ uav }: { uav: string }) {
   const whyNot = useWhyNot();
-  const [place, setPlace] = useState(() => rounded(uav));
+  const [position, setPosition] = useState(() => rounded(uav));
   return (
     <Section title="Go to">
       <form
         onSubmit={(event) => {
           event.preventDefault();
-          void commandAll("go to", [uav], () => sendTo(uav, place));
+          void commandAll("go to", [uav], () => sendTo(uav, position));
         }}
       >
         <Group gap={6} wrap="nowrap" align="end">
@@ -31,8 +31,8 @@ export function GoTo({ uav }: { uav: string }) {
               decimalScale={2}
               step={1}
               hideControls
-              value={place[axis]}
-              onChange={(value) => setPlace({ ...place, [axis]: Number(value) })}
+              value={position[axis]}
+              onChange={(value) => setPosition({ ...position, [axis]: Number(value) })}
             />
           ))}
           <Tooltip label={whyNot ?? "Fly to this position"}>

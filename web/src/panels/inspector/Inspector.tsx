@@ -12,7 +12,7 @@ import { Repair } from "./Repair.tsx";
 import { Sensors } from "./Sensors.tsx";
 
 /** Names that the list shows at a time; typing finds others. */
-const MOST_SHOWN = 200;
+const MAX_SHOWN = 200;
 
 /** The selected UAV: state, sensors and commands. */
 export default function Inspector() {
@@ -35,7 +35,7 @@ export default function Inspector() {
             flex={1}
             aria-label="Selected UAV"
             data={names}
-            limit={MOST_SHOWN}
+            limit={MAX_SHOWN}
             value={selected}
             searchable
             allowDeselect={false}

@@ -7,12 +7,12 @@ import { link } from "../../link/link.ts";
 import { useTopics } from "../../state/topics.ts";
 import { Section } from "./Section.tsx";
 
-const TELL_MS = 1000;
+const UPDATE_MS = 1000;
 
-/** Too large to be received only to be counted: their tiles and layers tell their rates. */
+/** Too large to be received only to be counted: their tiles and layers show their rates. */
 const LARGE = /\/(Image|CompressedImage|PointCloud2|OccupancyGrid|Octomap|MarkerArray)$/;
 
-/** What a UAV listens to, and tells nothing of. */
+/** Topics that a UAV subscribes to. */
 const COMMANDS = /\/(cmd_vel|goal_pose|trajectory|pose_command)$/;
 
 interface Stamped {
@@ -65,7 +65,7 @@ function useRates(topics: readonly TopicName[]): ReadonlyMap<string, number> {
       });
     const timer = setInterval(
       () => setRates(new Map([...meters].map(([name, meter]) => [name, meter.hz]))),
-      TELL_MS,
+      UPDATE_MS,
     );
     return () => {
       clearInterval(timer);

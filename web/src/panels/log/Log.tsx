@@ -15,7 +15,7 @@ const SORTS = [
   { value: "command", label: "Commands" },
 ];
 const COLOURS: Record<EntrySort, string> = { problem: "red", event: "gray", command: "cyan" };
-const MOST_SHOWN = 300;
+const MAX_SHOWN = 300;
 
 /** What happened and what was commanded, the newest first. */
 export default function Log() {
@@ -24,8 +24,8 @@ export default function Log() {
   const [filter, setFilter] = useState("");
   const matches = matcher(filter);
   const fitting = entries.filter(
-    ({ sort: its, who, kind, text }) =>
-      (sort === "all" || its === sort) && matches(`${who} ${kind} ${text}`),
+    ({ sort: its, source, kind, text }) =>
+      (sort === "all" || its === sort) && matches(`${source} ${kind} ${text}`),
   );
   return (
     <div className={classes.panel}>
@@ -59,7 +59,7 @@ export default function Log() {
       <ScrollArea flex={1} mih={0} type="auto">
         <div role="log" aria-label="Log">
           {fitting
-            .slice(-MOST_SHOWN)
+            .slice(-MAX_SHOWN)
             .toReversed()
             .map((entry) => (
               <Row key={entry.number} entry={entry} />
@@ -71,7 +71,7 @@ export default function Log() {
 }
 
 const Row = memo(function Row({ entry }: { entry: Entry }) {
-  const { timeS, sort, kind, who, text } = entry;
+  const { timeS, sort, kind, source, text } = entry;
   return (
     <div className={classes.row}>
       <span className={classes.time}>{clockText(timeS)}</span>
@@ -80,10 +80,10 @@ const Row = memo(function Row({ entry }: { entry: Entry }) {
       </Badge>
       {sort === "command" ? (
         <Text span inherit truncate c="dimmed">
-          {who}
+          {source}
         </Text>
       ) : (
-        <JumpTo uav={who} />
+        <JumpTo uav={source} />
       )}
       <Text span inherit className={classes.text} title={text}>
         {text}

@@ -2,7 +2,7 @@ import { useEffect, useRef, type KeyboardEvent, type PointerEvent, type RefObjec
 import {
   panned,
   pixelOf,
-  placeOf,
+  positionOf,
   zoomed,
   type MapView,
   type Size,
@@ -116,9 +116,9 @@ interface Click {
   sends: boolean;
 }
 
-/** A UAV that is clicked is selected; elsewhere the place is taken. */
+/** A UAV that is clicked is selected; elsewhere the position is taken. */
 function click(view: MapView, size: Size, { px, py, more, sends }: Click): void {
-  const [x, y] = placeOf(view, size, px, py);
+  const [x, y] = positionOf(view, size, px, py);
   if (useTool.getState().asking !== null) return givePosition({ x, y, z: heightAt(x, y) });
   const hit = useVehicles.getState().list.find(({ name }) => {
     const row = link.frames.row(baseFrame(name));

@@ -49,7 +49,7 @@ export default function MiniMap() {
   const shown = useRef<MapView | null>(null);
   const auto = useRef(new AutoFit());
   const plan = useWorldPlan((world) => world.plan);
-  useEffect(() => setView(null), [plan]); // another world: another place
+  useEffect(() => setView(null), [plan]); // another world: another view
   useDrawing(canvas, plan, view, auto.current, follows, shown);
   const fit = () => {
     auto.current.clear();
@@ -64,7 +64,7 @@ export default function MiniMap() {
       name="map"
       title="Map"
       usual={narrow ? BELOW_TOOLBAR : BESIDE_TOOLBAR}
-      mostShare={narrow ? 0.65 : 1}
+      maxFraction={narrow ? 0.65 : 1}
       aspect={1.25}
       actions={
         <MapButtons
@@ -88,7 +88,7 @@ export default function MiniMap() {
   );
 }
 
-/** view: as hands left it; null: nobody has moved it. Draws a dozen times a second, whatever React does. */
+/** view: as the user left it; null: the user has not moved it. Draws a dozen times a second, whatever React does. */
 function useDrawing(
   canvas: RefObject<HTMLCanvasElement | null>,
   plan: WorldPlan | null,
@@ -98,7 +98,7 @@ function useDrawing(
   shownNow: RefObject<MapView | null>,
 ): void {
   const dark = useComputedColorScheme("light") === "dark";
-  const picture = useMemo(() => plan && drawPlan(plan, dark ? DARK : LIGHT), [plan, dark]);
+  const background = useMemo(() => plan && drawPlan(plan, dark ? DARK : LIGHT), [plan, dark]);
   const trails = useTrails();
   const selected = useVehicles((vehicles) => vehicles.selected);
   const path = usePlannedPath(selected);
@@ -107,17 +107,17 @@ function useDrawing(
       const element = canvas.current;
       if (element === null || document.hidden || element.clientWidth === 0) return;
       const size = { width: element.clientWidth, height: element.clientHeight };
-      const uavs = places();
+      const uavs = uavPositions();
       let shown = view ?? auto.of([plan, uavs.length], () => extentOf(plan, uavs), size);
       const pose = link.frames.pose(baseFrame(selected));
       if (follows && pose !== null) shown = { ...shown, x: pose[0], y: pose[1] };
       shownNow.current = shown;
       const context = prepared(element, size);
-      if (picture !== null) {
-        const [left, top] = pixelOf(shown, size, picture.left, picture.top);
-        const width = (picture.right - picture.left) * shown.scale;
-        const height = (picture.top - picture.bottom) * shown.scale;
-        context.drawImage(picture.image, left, top, width, height);
+      if (background !== null) {
+        const [left, top] = pixelOf(shown, size, background.left, background.top);
+        const width = (background.right - background.left) * shown.scale;
+        const height = (background.top - background.bottom) * shown.scale;
+        context.drawImage(background.image, left, top, width, height);
       }
       const pen = new Pen(context, shown, size, dark);
       pen.cone();
@@ -131,7 +131,7 @@ function useDrawing(
     draw();
     const timer = setInterval(draw, FRAME_MS);
     return () => clearInterval(timer);
-  }, [canvas, view, auto, follows, shownNow, plan, picture, selected, trails, path, dark]);
+  }, [canvas, view, auto, follows, shownNow, plan, background, selected, trails, path, dark]);
 }
 
 function prepared(element: HTMLCanvasElement, { width, height }: Size): CanvasRenderingContext2D {
@@ -159,6 +159,6 @@ function travellers(): readonly Traveller[] {
   }));
 }
 
-function places(): Point[] {
+function uavPositions(): Point[] {
   return useVehicles.getState().list.map(({ position: p }): Point => [p.x, p.y]);
 }

@@ -1,9 +1,9 @@
-// The world from above as a picture that the map draws each time.
+// The world from above as an image that the map draws each time.
 
 import type { Heights } from "../../lib/heights.ts";
 import type { WorldPlan } from "../../state/worldPlan.ts";
 
-export interface PlanPicture {
+export interface PlanImage {
   image: HTMLCanvasElement;
   /** Edges in the map, m. */
   left: number;
@@ -20,16 +20,16 @@ export interface PlanColours {
   edge: string;
 }
 
-const MOST_PIXELS = 2048;
+const MAX_PIXELS = 2048;
 const FINEST_PIXELS_A_METRE = 8;
 const MARGIN_M = 2;
 
 /** Null where there is nothing to be seen. */
-export function drawPlan(plan: WorldPlan, colours: PlanColours): PlanPicture | null {
+export function drawPlan(plan: WorldPlan, colours: PlanColours): PlanImage | null {
   const box = boxOf(plan);
   if (box === null) return null;
   const side = Math.max(box.right - box.left, box.top - box.bottom);
-  const scale = Math.min(FINEST_PIXELS_A_METRE, MOST_PIXELS / side);
+  const scale = Math.min(FINEST_PIXELS_A_METRE, MAX_PIXELS / side);
   const image = document.createElement("canvas");
   image.width = Math.max(1, Math.round((box.right - box.left) * scale));
   image.height = Math.max(1, Math.round((box.top - box.bottom) * scale));
@@ -107,18 +107,18 @@ function drawTrees(
 function disks<T extends { x: number; y: number }>(
   context: CanvasRenderingContext2D,
   colour: string,
-  places: readonly T[],
-  radius: (place: T) => number,
+  items: readonly T[],
+  radius: (item: T) => number,
   alpha: number,
 ): void {
   context.globalAlpha = alpha;
   context.fillStyle = colour;
   context.beginPath();
-  for (const place of places) {
-    const r = radius(place);
+  for (const item of items) {
+    const r = radius(item);
     if (r <= 0) continue;
-    context.moveTo(place.x + r, place.y);
-    context.arc(place.x, place.y, r, 0, 2 * Math.PI);
+    context.moveTo(item.x + r, item.y);
+    context.arc(item.x, item.y, r, 0, 2 * Math.PI);
   }
   context.fill();
   context.globalAlpha = 1;

@@ -1,4 +1,4 @@
-// What moves on the map: UAVs, ways they came and go, the view.
+// What moves on the map: UAVs, where they came from and go, the view.
 
 import { eulerOf } from "../../lib/pose.ts";
 import { barLength, pixelOf, type MapView, type Size } from "../../lib/mapProjection.ts";
@@ -154,11 +154,11 @@ export class Pen {
     context.strokeStyle = this.dark ? "#10131a" : "#ffffff";
     context.fillStyle = this.dark ? "#f8f9fa" : "#212529";
     const y = py < NAME_ROOM_PX ? py + NAME_ROOM_PX : py - 17; // inside the window also at its edge
-    const mostPx = this.size.width - 8;
-    const halfPx = Math.min(mostPx, context.measureText(name).width) / 2 + 4;
+    const maxPx = this.size.width - 8;
+    const halfPx = Math.min(maxPx, context.measureText(name).width) / 2 + 4;
     const x = Math.max(halfPx, Math.min(px, this.size.width - halfPx));
-    context.strokeText(name, x, y, mostPx);
-    context.fillText(name, x, y, mostPx);
+    context.strokeText(name, x, y, maxPx);
+    context.fillText(name, x, y, maxPx);
   }
 
   /** How long a metre is. */

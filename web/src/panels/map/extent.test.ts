@@ -19,12 +19,12 @@ it("bare ground does not make dots of the UAVs", () => {
   expect(extentOf(null, UAVS)).toEqual(UAVS);
 });
 
-it("what stands is in the picture", () => {
+it("what stands is in the view", () => {
   const trees = [tree(30, 5), tree(-10, 40)];
   const roofs = new Float32Array([50, -20, 4, 52, -20, 4, 52, -22, 4]);
   expect(extentOf({ ...BARE, trees, roofs }, UAVS)).toEqual([...UAVS, [-10, -22], [52, 40]]);
 });
 
-it("a vast world is left to who zooms out", () => {
+it("a vast world is left to zooming out", () => {
   expect(extentOf({ ...BARE, trees: [tree(0, 0), tree(2500, 0)] }, UAVS)).toEqual(UAVS);
 });

@@ -6,7 +6,7 @@ import type { WorldPlan } from "../../state/worldPlan.ts";
 /** A wider world would make dots of the UAVs, m. */
 const VAST_M = 2000;
 
-/** Points that are in the picture: the UAVs, and what stands; bare ground is no reason to look far. */
+/** Points that are in the view: the UAVs, and what stands; bare ground is no reason to look far. */
 export function extentOf(plan: WorldPlan | null, uavs: readonly Point[]): Point[] {
   if (plan === null) return [...uavs];
   let [left, right, bottom, top] = [Infinity, -Infinity, Infinity, -Infinity];

@@ -3,8 +3,8 @@ import { useEpoch } from "../../state/epoch.ts";
 import { isRestarting } from "../../state/restarts.ts";
 import { useVehicles } from "../../state/vehicles.ts";
 
-const MOST_POINTS = 600;
-const LEAST_STEP_M = 0.3;
+const MAX_POINTS = 600;
+const MIN_STEP_M = 0.3;
 /** A UAV that was put elsewhere did not fly there. */
 const LONGEST_STEP_M = 50;
 
@@ -15,10 +15,10 @@ export class Trail {
   add(x: number, y: number): void {
     const { points } = this;
     const step = Math.hypot(x - (points.at(-2) ?? Infinity), y - (points.at(-1) ?? Infinity));
-    if (step < LEAST_STEP_M) return;
+    if (step < MIN_STEP_M) return;
     if (step > LONGEST_STEP_M) points.length = 0;
     points.push(x, y);
-    if (points.length > 2 * MOST_POINTS) points.splice(0, 2);
+    if (points.length > 2 * MAX_POINTS) points.splice(0, 2);
   }
 }
 

@@ -7,7 +7,7 @@ import { useTopics } from "../../state/topics.ts";
 import { Reason } from "../shared/Reason.tsx";
 import { usePaths } from "./usePaths.ts";
 
-const MOST_SHOWN = 200;
+const MAX_SHOWN = 200;
 /** So many UAVs are drawn at once; every one of them is received. */
 const MAX_UAVS = 24;
 
@@ -95,7 +95,7 @@ function FieldChoice({ axis, line, choose }: FieldChoiceProps) {
         <Select
           size="xs"
           searchable
-          limit={MOST_SHOWN}
+          limit={MAX_SHOWN}
           aria-label={`Topic of ${axis}`}
           placeholder="Topic"
           data={[...new Set(all.map(({ name }) => name))]}
@@ -110,7 +110,7 @@ function FieldChoice({ axis, line, choose }: FieldChoiceProps) {
         <Select
           size="xs"
           searchable
-          limit={MOST_SHOWN}
+          limit={MAX_SHOWN}
           aria-label={`Field of ${axis}`}
           placeholder="Field"
           disabled={line === null}

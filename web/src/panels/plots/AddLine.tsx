@@ -5,7 +5,7 @@ import { useTopics } from "../../state/topics.ts";
 import { Reason } from "../shared/Reason.tsx";
 import { usePaths } from "./usePaths.ts";
 
-const MOST_SHOWN = 200;
+const MAX_SHOWN = 200;
 
 /** Choose a topic, then one of its numbers. */
 export function AddLine({ plot }: { plot: number }) {
@@ -19,7 +19,7 @@ export function AddLine({ plot }: { plot: number }) {
         size="xs"
         flex={1}
         searchable
-        limit={MOST_SHOWN}
+        limit={MAX_SHOWN}
         aria-label="Topic of a new line"
         placeholder="Topic"
         data={[...new Set(all.map(({ name }) => name))]}
@@ -31,7 +31,7 @@ export function AddLine({ plot }: { plot: number }) {
         size="xs"
         flex={1}
         searchable
-        limit={MOST_SHOWN}
+        limit={MAX_SHOWN}
         aria-label="Field of a new line"
         placeholder="Field"
         disabled={topic === null}

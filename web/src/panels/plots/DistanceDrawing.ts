@@ -31,12 +31,12 @@ export class DistanceDrawing implements Surface {
   private countedMs = -Infinity;
 
   constructor(
-    place: HTMLElement,
+    container: HTMLElement,
     private readonly of: DistancePlot["of"],
     look: Look,
     private readonly drawn: (distribution: Distribution | null) => void,
   ) {
-    const { width, height } = place.getBoundingClientRect();
+    const { width, height } = container.getBoundingClientRect();
     const labelled = { labelSize: 18, labelFont: "12px system-ui, sans-serif" };
     this.plot = new uPlot(
       {
@@ -69,7 +69,7 @@ export class DistanceDrawing implements Surface {
         ],
       },
       [[], []],
-      place,
+      container,
     );
   }
 
@@ -87,8 +87,9 @@ export class DistanceDrawing implements Surface {
     if (to === this.countedS || now - this.countedMs < COUNT_MS) return;
     this.countedS = to;
     this.countedMs = now;
-    const places = placesOfUavs();
-    const distances = this.of === "nearest" ? nearestDistances(places) : pairDistances(places);
+    const positions = uavPositions();
+    const distances =
+      this.of === "nearest" ? nearestDistances(positions) : pairDistances(positions);
     const histogram = histogramOf(distances);
     const { width, shares } = histogram;
     this.plot.batch(() => {
@@ -105,12 +106,12 @@ export class DistanceDrawing implements Surface {
 }
 
 /** x y z of each UAV in turn, map, m. */
-function placesOfUavs(): number[] {
+function uavPositions(): number[] {
   const { now } = link.frames;
-  const places: number[] = [];
+  const positions: number[] = [];
   for (const { name } of useVehicles.getState().list) {
     const at = link.frames.row(baseFrame(name)) * POSE;
-    if (at >= 0 && Number.isFinite(now[at])) places.push(now[at]!, now[at + 1]!, now[at + 2]!);
+    if (at >= 0 && Number.isFinite(now[at])) positions.push(now[at]!, now[at + 1]!, now[at + 2]!);
   }
-  return places;
+  return positions;
 }

@@ -78,7 +78,7 @@ export function PlotFrame(props: PlotFrameProps) {
       </Group>
       <div className={classes.field}>
         <div
-          ref={drawn.place}
+          ref={drawn.container}
           className={classes.canvas}
           data-empty={legend.length === 0 || undefined}
         />

@@ -8,7 +8,7 @@ export interface Drawn {
   name: string;
   colour: string;
   series: Series;
-  /** Least span of its axis; NaN: by its values. */
+  /** Minimum span of its axis; NaN: by its values. */
   minSpan: number;
 }
 
@@ -19,11 +19,11 @@ export class TimeDrawing implements Surface {
   zoomed: [number, number] | null = null;
 
   constructor(
-    place: HTMLElement,
+    container: HTMLElement,
     private readonly lines: readonly Drawn[],
     look: Look,
   ) {
-    const { width, height } = place.getBoundingClientRect();
+    const { width, height } = container.getBoundingClientRect();
     const spans = lines.map(({ minSpan }) => minSpan).filter((span) => !Number.isNaN(span));
     const minSpan = spans.length === 0 ? NaN : Math.max(...spans);
     this.plot = new uPlot(
@@ -57,9 +57,9 @@ export class TimeDrawing implements Surface {
         ],
       },
       [[], ...lines.map(() => [])] as unknown as uPlot.AlignedData,
-      place,
+      container,
     );
-    place.addEventListener("dblclick", this.showNewest);
+    container.addEventListener("dblclick", this.showNewest);
   }
 
   readonly showNewest = () => {

@@ -15,7 +15,7 @@ export interface XYAxes {
   /** What stands beside each axis. */
   xLabel: string;
   yLabel: string;
-  /** Least spans; NaN: by the values. */
+  /** Minimum spans; NaN: by the values. */
   xMinSpan: number;
   yMinSpan: number;
   /** Whether both have the same scale. */
@@ -38,12 +38,12 @@ export class XYDrawing implements Surface {
   private zoomed: [Range, Range] | null = null;
 
   constructor(
-    place: HTMLElement,
+    container: HTMLElement,
     private readonly lines: readonly XYLine[],
     private readonly axes: XYAxes,
     look: Look,
   ) {
-    const { width, height } = place.getBoundingClientRect();
+    const { width, height } = container.getBoundingClientRect();
     const scale: uPlot.Scale = {
       time: false,
       auto: false,
@@ -74,9 +74,9 @@ export class XYDrawing implements Surface {
         series: [{}, { show: false }],
       },
       [[], []],
-      place,
+      container,
     );
-    place.addEventListener("dblclick", this.showNewest);
+    container.addEventListener("dblclick", this.showNewest);
   }
 
   readonly showNewest = () => {
@@ -145,13 +145,13 @@ export class XYDrawing implements Surface {
 /** The curve, and a dot at its end. */
 function stroke(plot: uPlot, { x, y }: Points): void {
   const { ctx } = plot;
-  const least = MIN_STEP_PX * devicePixelRatio;
+  const minStep = MIN_STEP_PX * devicePixelRatio;
   let [lastX, lastY] = [NaN, NaN];
   ctx.beginPath();
   for (let i = 0; i < x.length; i++) {
     const px = plot.valToPos(x[i]!, "x", true);
     const py = plot.valToPos(y[i]!, "y", true);
-    if (Math.abs(px - lastX) < least && Math.abs(py - lastY) < least) continue;
+    if (Math.abs(px - lastX) < minStep && Math.abs(py - lastY) < minStep) continue;
     if (Number.isNaN(lastX)) ctx.moveTo(px, py);
     else if (!Number.isNaN(px)) ctx.lineTo(px, py);
     [lastX, lastY] = [px, py];

@@ -7,7 +7,7 @@ export interface Look {
   grid: string;
 }
 
-/** Least size of a drawing, px. */
+/** Minimum size of a drawing, px. */
 export const MIN_PX = 60;
 const DIGIT_PX = 7.5;
 
@@ -28,7 +28,7 @@ export function uprightAxis(look: Look): uPlot.Axis {
   };
 }
 
-/** A mark with the digits that tell it from the next one. */
+/** A mark with the digits that distinguish it from the next one. */
 export function fixed(mark: number, step: number): string {
   return mark.toFixed(Math.min(12, Math.max(0, -Math.floor(Math.log10(step)))));
 }

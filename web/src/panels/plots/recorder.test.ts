@@ -22,10 +22,10 @@ const { seriesOf } = await import("./recorder.ts");
 const of = (path: string) => ({ topic: "/uav1/odom", type: "nav_msgs/msg/Odometry", path });
 const [x, y] = [of("pose.pose.position.x"), of("pose.pose.position.y")];
 
-function tell(sec: number, place: { x: number; y: number }): void {
+function publish(sec: number, position: { x: number; y: number }): void {
   const message = {
     header: { stamp: { sec, nanosec: 0 } },
-    pose: { pose: { position: { ...place, z: 0 } } },
+    pose: { pose: { position: { ...position, z: 0 } } },
   };
   for (const listener of listeners.get("/uav1/odom") ?? []) listener({ message });
 }
@@ -35,16 +35,16 @@ const drawn = () => curveOf(seriesOf(x), seriesOf(y), -100, 1000);
 it("both numbers of a curve are recorded, cleared with the world, and let go with the plot", () => {
   addXYPlot([{ x, y }]);
   expect(drawn()).toEqual({ x: [], y: [] });
-  tell(1, { x: 5, y: 6 });
-  tell(2, { x: 7, y: 8 });
+  publish(1, { x: 5, y: 6 });
+  publish(2, { x: 7, y: 8 });
   expect(drawn()).toEqual({ x: [5, 7], y: [6, 8] });
 
   useEpoch.setState({ epoch: 1, run: 0 }); // a moved playback: what is earlier stays
   expect(drawn().x).toEqual([5, 7]);
   useEpoch.setState({ epoch: 2, run: 1 }); // another world or log
   expect(drawn().x).toEqual([]);
-  tell(3, { x: 1, y: 2 });
-  tell(0, { x: 0, y: 0 }); // a reset
+  publish(3, { x: 1, y: 2 });
+  publish(0, { x: 0, y: 0 }); // a reset
   expect(drawn()).toEqual({ x: [0], y: [0] });
 
   removePlot(usePlots.getState().plots.at(-1)!.id);

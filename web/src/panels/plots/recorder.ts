@@ -42,8 +42,8 @@ function timeOf(message: unknown): number {
     header?: { stamp: { sec: number; nanosec: number } };
     stamp?: { sec: number; nanosec: number };
   };
-  const told = header?.stamp ?? stamp;
-  return told === undefined ? presentS() : secondsOf(told);
+  const time = header?.stamp ?? stamp;
+  return time === undefined ? presentS() : secondsOf(time);
 }
 
 /** Simulated time of what came last; of a robot without transforms the page's own clock, s. */

@@ -20,26 +20,26 @@ export interface Surface {
 }
 
 export interface Drawn {
-  place: RefObject<HTMLDivElement | null>;
+  container: RefObject<HTMLDivElement | null>;
   showNewest: () => void;
 }
 
 /**
  * Keep a drawing in an element up to date; while `paused` it shows what was the newest then.
- * `make` is called anew whenever it is another function.
+ * `make` is called again whenever it is another function.
  */
 export function useDrawing(
   make: (element: HTMLElement, look: Look) => Surface,
   paused: boolean,
 ): Drawn {
   const scheme = useComputedColorScheme();
-  const place = useRef<HTMLDivElement>(null);
+  const container = useRef<HTMLDivElement>(null);
   const surface = useRef<Surface | null>(null);
   const still = useRef<number | null>(null);
   still.current = paused ? (still.current ?? presentS()) : null;
 
   useEffect(() => {
-    const element = place.current!;
+    const element = container.current!;
     const made = make(element, LOOKS[scheme]);
     surface.current = made;
     const sized = new ResizeObserver(([entry]) => {
@@ -57,5 +57,5 @@ export function useDrawing(
     };
   }, [make, scheme]);
 
-  return { place, showNewest: () => surface.current?.showNewest() };
+  return { container, showNewest: () => surface.current?.showNewest() };
 }

@@ -39,7 +39,7 @@ export interface Sample {
   value: number;
 }
 
-const MOST_BARS = 40;
+const MAX_BARS = 40;
 const KEPT_MS = 30_000;
 const AXES = ["x", "y", "z"];
 const CHOICES = ["hover", "forward", "back", "left", "right", "up", "down"];
@@ -92,7 +92,7 @@ export function observationBars(parts: readonly Part[], numbers: ArrayLike<numbe
   let first = 0;
   for (const part of parts) {
     const count = part.size * part.history;
-    const shown = Math.min(count, MOST_BARS);
+    const shown = Math.min(count, MAX_BARS);
     const bars = Array.from({ length: shown }, (_, k) => {
       const value = numbers[first + k] ?? NaN;
       return { label: labelOf(part, k), value, text: quantity(value * part.scale, part.unit) };

@@ -134,13 +134,13 @@ function Recorder({ onChange, whyNot }: RecorderProps) {
 
   const start = async () => {
     const path = name.trim() === "" ? usualName() : name.trim();
-    const told = await attempt("Recording failed", startRecording(withSuffix(path)));
-    if (told !== null) setName("");
+    const answer = await attempt("Recording failed", startRecording(withSuffix(path)));
+    if (answer !== null) setName("");
     onChange();
   };
   const stop = async () => {
-    const told = await attempt("Recording failed", stopRecording());
-    if (told !== null) showSuccess(`Recorded ${counted(told.messages, "message")}`);
+    const answer = await attempt("Recording failed", stopRecording());
+    if (answer !== null) showSuccess(`Recorded ${counted(answer.messages, "message")}`);
     onChange();
   };
 

@@ -11,7 +11,7 @@ interface CardProps {
   choose: () => void;
 }
 
-/** A scenario as a picture, its name in words and what flies there. */
+/** A scenario as an image, its name in words and what flies there. */
 export function Card({ card, present, choose }: CardProps) {
   const { name, title, description, picture, world, uploaded, missing } = card;
   const contents = contentsOf(card);
@@ -23,7 +23,7 @@ export function Card({ card, present, choose }: CardProps) {
       aria-label={`${name}: ${title}. ${description}`}
       data-present={present || undefined}
     >
-      <div className="card-picture">
+      <div className="card-image">
         {picture === null ? (
           <Icon size={44} strokeWidth={1.2} aria-hidden />
         ) : (

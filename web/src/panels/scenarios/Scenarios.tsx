@@ -23,7 +23,7 @@ import { FilterInput } from "../shared/FilterInput.tsx";
 import { Card } from "./Card.tsx";
 import { Start } from "./Start.tsx";
 
-/** Picture cards of all scenarios; a chosen one is set up and started. */
+/** Image cards of all scenarios; a chosen one is set up and started. */
 export default function Scenarios() {
   const wanted = useWindows((windows) => windows.scenario);
   const [cards, setCards] = useState<ScenarioCard[] | null>(null);

@@ -23,9 +23,9 @@ import { closeWindow } from "../../state/windows.ts";
 import { sensorSetsOf } from "./sensorSets.ts";
 import { SubmitRow } from "./SubmitRow.tsx";
 
-const MOST_UAVS = 10_000;
+const MAX_UAVS = 10_000;
 
-/** How a scenario is to be flown. What is left as it is is not told to the server. */
+/** How a scenario is to be flown. What is left as it is is not sent to the server. */
 export function Start({ card, back }: { card: ScenarioCard; back: () => void }) {
   const offered = useChoices();
   const whyNot = useWhyNotOpen();
@@ -56,7 +56,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
           <NumberInput
             label="UAVs"
             min={1}
-            max={MOST_UAVS}
+            max={MAX_UAVS}
             allowDecimal={false}
             value={changes.uavs ?? card.uavs}
             onChange={(value) => change({ uavs: Number(value) })}
@@ -148,7 +148,7 @@ function SensorSets({ offered, value, onChange }: SensorSetsProps) {
   );
 }
 
-/** What the server offers to choose; null: it does not tell. */
+/** What the server offers to choose; null: it does not report it. */
 function useChoices(): Choices | null {
   const [offered, setOffered] = useState<Choices | null>(null);
   useEffect(() => {

@@ -10,7 +10,7 @@ import classes from "./Services.module.css";
 
 const NONE: string[] = [];
 const ASK_MS = 5000;
-const MOST_SHOWN = 300;
+const MAX_SHOWN = 300;
 
 /** Every service; a form made of its description calls it. */
 export default function Services() {
@@ -31,7 +31,7 @@ export default function Services() {
         />
         <Reason>{reason}</Reason>
         <ScrollArea flex={1} mih={0}>
-          {fitting.slice(0, MOST_SHOWN).map((name) => (
+          {fitting.slice(0, MAX_SHOWN).map((name) => (
             <NavLink
               key={name}
               component="button"

@@ -11,7 +11,7 @@ interface MessageFormProps {
 }
 
 /** So many numbers stand side by side: the parts of a point or of a quaternion. */
-const MOST_IN_A_ROW = 4;
+const MAX_IN_A_ROW = 4;
 
 /** A form for any type, made of its description. */
 export function MessageForm({ fields, value, onChange }: MessageFormProps) {
@@ -24,7 +24,7 @@ export function MessageForm({ fields, value, onChange }: MessageFormProps) {
     />
   ));
   const row =
-    fields.length <= MOST_IN_A_ROW && fields.every(({ type, array }) => !array && isNumeric(type));
+    fields.length <= MAX_IN_A_ROW && fields.every(({ type, array }) => !array && isNumeric(type));
   if (!row) return <Stack gap={6}>{inputs}</Stack>;
   return (
     <Group gap={6} wrap="nowrap" align="start" grow>

@@ -47,8 +47,8 @@ interface EntryProps extends BranchProps {
   step: string | number;
 }
 
-function Entry({ step, value: told, path, onPlot }: EntryProps) {
-  const value = parsed(told);
+function Entry({ step, value: raw, path, onPlot }: EntryProps) {
+  const value = parsed(raw);
   const branch = value !== null && typeof value === "object";
   return branch ? (
     <Branch step={step} value={value} path={path} onPlot={onPlot} />
@@ -104,11 +104,11 @@ function sizeOf(value: unknown): number {
   return value !== null && typeof value === "object" ? Object.keys(value).length : 0;
 }
 
-function entriesOf(value: unknown, most: number): [string | number, unknown][] {
+function entriesOf(value: unknown, count: number): [string | number, unknown][] {
   if (isArray(value)) {
-    return Array.from({ length: Math.min(most, value.length) }, (_, i) => [i, value[i]]);
+    return Array.from({ length: Math.min(count, value.length) }, (_, i) => [i, value[i]]);
   }
-  return value !== null && typeof value === "object" ? Object.entries(value).slice(0, most) : [];
+  return value !== null && typeof value === "object" ? Object.entries(value).slice(0, count) : [];
 }
 
 function leafText(value: unknown): string {

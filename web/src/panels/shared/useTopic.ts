@@ -20,7 +20,7 @@ const SHOW_MS = 250;
 /** Bursts between two posts of the page's worker must not count as lost. */
 const DEPTH = 100;
 
-/** Every message of a topic, told a few times a second; while not `wanted` nothing is received. */
+/** Every message of a topic, updated a few times a second; while not `wanted` nothing is received. */
 export function useTopic(topic: string, type: string, wanted: boolean): Followed {
   const [followed, setFollowed] = useState(NOTHING);
   useEffect(() => {

@@ -8,7 +8,7 @@ import classes from "./Topics.module.css";
 
 const PAGE = 150;
 
-/** Every topic; one that is ticked or unfolded is received, and its true rate and size told. */
+/** Every topic; one that is ticked or unfolded is received, and its true rate and size shown. */
 export default function Topics() {
   const all = useTopics(({ list }) => list);
   const [filter, setFilter] = useState("");

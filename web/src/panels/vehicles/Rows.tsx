@@ -17,7 +17,7 @@ interface RowsProps {
   selected: string;
   group: readonly string[];
   choose: (name: string, how: Choice) => void;
-  /** Of who is clicked twice. */
+  /** Of the UAV that is clicked twice. */
   open: () => void;
 }
 

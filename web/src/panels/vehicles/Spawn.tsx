@@ -10,7 +10,7 @@ import { heightAt } from "../../state/worldPlan.ts";
 import { spiral } from "./spiral.ts";
 
 const SPACING_M = 2;
-/** Places that are tried for each UAV where some are taken. */
+/** Positions that are tried for each UAV where some are taken. */
 const TRIES = 12;
 
 /** New UAVs of any airframe: where one clicks, or wherever there is room. */
@@ -36,8 +36,8 @@ export function Spawn({ close }: { close: () => void }) {
     close();
   };
   const byClick = async () => {
-    const place = await pickPosition(count === 1 ? "New UAV" : `${count} new UAVs`);
-    if (place !== null) await add(place);
+    const position = await pickPosition(count === 1 ? "New UAV" : `${count} new UAVs`);
+    if (position !== null) await add(position);
   };
   const disabled = whyNot !== null || uri === null || busy;
   return (
@@ -85,16 +85,16 @@ export function Spawn({ close }: { close: () => void }) {
   );
 }
 
-/** Try places ever farther away until all have come; what came, else the last reason. */
+/** Try positions ever farther away until all have come; what came, else the last reason. */
 async function spawnAround(uri: string, count: number, around: { x: number; y: number }) {
-  const places = spiral(count * TRIES, SPACING_M).map(([dx, dy]): Position => {
+  const positions = spiral(count * TRIES, SPACING_M).map(([dx, dy]): Position => {
     const [x, y] = [around.x + dx, around.y + dy];
     return { x, y, z: heightAt(x, y) };
   });
   const came: string[] = [];
   let refused: unknown = null;
-  while (came.length < count && places.length > 0) {
-    const next = places.splice(0, count - came.length);
+  while (came.length < count && positions.length > 0) {
+    const next = positions.splice(0, count - came.length);
     try {
       came.push(...(await spawn(uri, next)));
     } catch (error) {

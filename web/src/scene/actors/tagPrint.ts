@@ -1,5 +1,5 @@
 // The print of an AprilTag: from an actor's tags (simulation_interfaces) to boards and black cells.
-// As in `volery.world.actors.tags`: x to the top of the picture, y to its left, z out of it.
+// As in `volery.world.actors.tags`: x to the top of the image, y to its left, z out of it.
 
 const CELLS = 8;
 const CODE_CELLS = 6;

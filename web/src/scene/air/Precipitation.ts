@@ -6,21 +6,21 @@ import { disposeParticles, particleMesh, type ParticleMesh } from "./particleMes
 
 /** Drops and flakes fill a box of this side around the camera, m. */
 const BOX_M = 24;
-/** mm/h that fills all places that there are. */
+/** mm/h at which all drops or flakes are drawn. */
 const HEAVY = { rain: 40, snow: 8 };
 const FALL_M_S = { rain: 8, snow: 1.3 };
-/** So long a drop streaks, s: what a picture of a fiftieth of a second shows. */
+/** So long a drop streaks, s: what an exposure of a fiftieth of a second shows. */
 const STREAK_S = 0.02;
 
 const VERTEX = /* glsl */ `
 #include <fog_pars_vertex>
-attribute vec3 place;
+attribute vec3 origin;
 uniform vec3 eye, offset, streak;
 uniform float thick, snowing;
 varying vec2 vAcross;
 void main() {
   // Each falls through its box for ever; the box goes with the camera.
-  vec3 p = mod(place * ${BOX_M.toFixed(1)} + offset - eye, ${BOX_M.toFixed(1)}) - ${(BOX_M / 2).toFixed(1)} + eye;
+  vec3 p = mod(origin * ${BOX_M.toFixed(1)} + offset - eye, ${BOX_M.toFixed(1)}) - ${(BOX_M / 2).toFixed(1)} + eye;
   vec4 mvPosition = viewMatrix * vec4(p, 1.0);
   vec3 along = (viewMatrix * vec4(streak, 0.0)).xyz;
   vec3 side = normalize(cross(along, mvPosition.xyz));
@@ -55,7 +55,7 @@ export class Precipitation implements Part {
   constructor(
     private readonly kind: "rain" | "snow",
     private readonly air: Air,
-    most: number,
+    maxParticles: number,
   ) {
     const vector = () => ({ value: new Vector3() });
     this.object = particleMesh({
@@ -70,7 +70,7 @@ export class Precipitation implements Part {
         snowing: { value: kind === "snow" ? 1 : 0 },
       },
       attributes: {
-        place: { size: 3, values: Float32Array.from({ length: 3 * most }, Math.random) },
+        origin: { size: 3, values: Float32Array.from({ length: 3 * maxParticles }, Math.random) },
       },
       renderOrder: 2000,
     });

@@ -65,7 +65,7 @@ export class Sun implements Part {
     this.fresh = true;
   }
 
-  /** Keep the map's square ahead of the camera; draw it anew only when there is a reason. */
+  /** Keep the map's square ahead of the camera; draw it again only when there is a reason. */
   private follow({ camera, nowMs }: Moment): void {
     const { x, y, z } = camera.position;
     const height = Math.max(2, z - this.groundAt(x, y));

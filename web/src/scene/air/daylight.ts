@@ -1,5 +1,5 @@
 // Light of sun and sky from where the sun stands and what is in the air: pure functions, so that
-// the picture of a place is the same whenever it is asked for. Colours are linear; numbers are
+// an image from a position is the same whenever it is requested. Colours are linear; numbers are
 // modelling choices near those of the simulated cameras (`volery.sensors.cameras.light`).
 
 export type Rgb = [number, number, number];

@@ -1,6 +1,6 @@
 // Distance fog as it is in the air: what is left of a contrast is exp(-extinction distance), with the
 // true distance instead of the depth, mixed as light and before tone mapping. three's own fog is
-// squared and mixed into the finished picture; these pieces of its shaders are replaced for
+// squared and mixed into the finished image; these pieces of its shaders are replaced for
 // all materials, before the first of them is compiled.
 
 import { FogExp2, ShaderChunk } from "three";
@@ -8,9 +8,9 @@ import { FogExp2, ShaderChunk } from "three";
 const LIGHT = /* glsl */ `
 #ifdef USE_FOG
 	#ifdef FOG_EXP2
-		float kept = exp( - fogDensity * length( vFogPlace ) );
+		float kept = exp( - fogDensity * length( vFogPosition ) );
 	#else
-		float kept = 1.0 - smoothstep( fogNear, fogFar, length( vFogPlace ) );
+		float kept = 1.0 - smoothstep( fogNear, fogFar, length( vFogPosition ) );
 	#endif
 	gl_FragColor.rgb = mix( hazeLight, gl_FragColor.rgb, kept );
 #endif
@@ -27,11 +27,11 @@ const HAZE = /* glsl */ `
 for (const chunk of ["fog_pars_vertex", "fog_pars_fragment"] as const)
   ShaderChunk[chunk] = ShaderChunk[chunk].replace(
     "varying float vFogDepth",
-    "varying vec3 vFogPlace",
+    "varying vec3 vFogPosition",
   );
 ShaderChunk.fog_vertex = /* glsl */ `
 #ifdef USE_FOG
-	vFogPlace = mvPosition.xyz;
+	vFogPosition = mvPosition.xyz;
 #endif
 `;
 ShaderChunk.opaque_fragment += HAZE + LIGHT;

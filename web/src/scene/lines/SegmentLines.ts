@@ -84,7 +84,7 @@ export class SegmentLines {
     this.object.material.uniforms.opacity!.value = opacity;
   }
 
-  /** Put segment `i`; born at `bornS` where lines fade. Tell the buffer with `sent` afterwards. */
+  /** Put segment `i`; born at `bornS` where lines fade. Upload with `send` afterwards. */
   put(
     i: number,
     ax: number,
@@ -165,8 +165,8 @@ void main() {
   if (fadeS > 0.0) vTint.a *= clamp(1.0 - (nowS - end.w) / fadeS, 0.0, 1.0);
 #ifdef PIXELS
   vec4 from = projectionMatrix * a, to = projectionMatrix * b;
-  vec2 way = (to.xy / to.w - from.xy / from.w) * size;
-  vec2 side = length(way) > 1e-4 ? normalize(vec2(-way.y, way.x)) : vec2(1.0, 0.0);
+  vec2 along = (to.xy / to.w - from.xy / from.w) * size;
+  vec2 side = length(along) > 1e-4 ? normalize(vec2(-along.y, along.x)) : vec2(1.0, 0.0);
   gl_Position = projectionMatrix * mvPosition;
   gl_Position.xy += side * position.y * (start.w + 1.0) / size * gl_Position.w;
   vSoft = 1.0 / (start.w + 1.0);

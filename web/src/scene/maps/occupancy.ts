@@ -3,7 +3,7 @@ const BLOCKED = [24, 32, 44, 225] as const;
 const FREE = [240, 246, 250, 70] as const;
 
 /** Pixels (RGBA) of an occupancy grid, row by row from its origin; null: it has too few cells. */
-export function picturesOfGrid(
+export function pixelsOfGrid(
   data: ArrayLike<number>,
   width: number,
   height: number,

@@ -11,7 +11,7 @@ import type { nav_msgs_OccupancyGrid } from "../../messages/generated.ts";
 import { frameOf } from "../stage/frames.ts";
 import type { Part } from "../stage/part.ts";
 import { currentWorld } from "../world/currentWorld.ts";
-import { picturesOfGrid } from "./occupancy.ts";
+import { pixelsOfGrid } from "./occupancy.ts";
 import { TopicMeshes } from "./TopicMeshes.ts";
 
 /** Maps lie so far above the ground, each a little above the one before, m. */
@@ -20,7 +20,7 @@ const STEP_M = 0.01;
 
 type MapMesh = Mesh<PlaneGeometry, MeshBasicMaterial>;
 
-/** Occupancy grids as pictures that lie on the ground. */
+/** Occupancy grids as images that lie on the ground. */
 export function occupancyMaps(): Part {
   return new TopicMeshes<MapMesh>({
     layer: "maps",
@@ -36,7 +36,7 @@ export function occupancyMaps(): Part {
 }
 
 function mapMesh({ header, info, data }: nav_msgs_OccupancyGrid, below: number): MapMesh | null {
-  const pixels = picturesOfGrid(data, info.width, info.height);
+  const pixels = pixelsOfGrid(data, info.width, info.height);
   if (pixels === null || !(info.resolution > 0)) return null;
   const texture = new DataTexture(pixels, info.width, info.height);
   texture.colorSpace = SRGBColorSpace;

@@ -12,17 +12,17 @@ export interface Voxels {
   count: number;
 }
 
-/** Occupied cubes of a map; `most` of them at most. */
+/** Occupied cubes of a map; `maxCubes` of them at most. */
 export function occupiedCubes(
   data: Uint8Array,
   resolution: number,
   binary: boolean,
-  most: number,
+  maxCubes: number,
   coloured = false,
 ): Voxels {
-  const cubes = new Float32Array(4 * most);
+  const cubes = new Float32Array(4 * maxCubes);
   if (!(resolution > 0) || data.length === 0) return { cubes, count: 0 };
-  const reader = new Reader(data, resolution, cubes, most, coloured ? COLOUR_BYTES : 0);
+  const reader = new Reader(data, resolution, cubes, maxCubes, coloured ? COLOUR_BYTES : 0);
   if (binary) reader.binaryNode(0, 0, 0, DEPTH);
   else reader.fullNode(0, 0, 0, DEPTH);
   return { cubes, count: reader.count };
@@ -37,7 +37,7 @@ class Reader {
     private readonly data: Uint8Array,
     private readonly resolution: number,
     private readonly cubes: Float32Array,
-    private readonly most: number,
+    private readonly maxCubes: number,
     private readonly extraBytes: number,
   ) {
     this.view = new DataView(data.buffer, data.byteOffset, data.byteLength);
@@ -91,7 +91,7 @@ class Reader {
   }
 
   private put(x: number, y: number, z: number, side: number): void {
-    if (this.count >= this.most) return;
+    if (this.count >= this.maxCubes) return;
     this.cubes.set([x, y, z, 0.5 * side], 4 * this.count++);
   }
 }

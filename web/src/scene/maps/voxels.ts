@@ -12,7 +12,7 @@ import { occupiedCubes, type Voxels as Cubes } from "./octomap.ts";
 import { TopicMeshes } from "./TopicMeshes.ts";
 
 const POSED = "octomap_msgs/msg/OctomapWithPose";
-const MOST = 150_000;
+const MAX_CUBES = 150_000;
 
 type VoxelMesh = InstancedMesh<BoxGeometry, MeshLambertMaterial>;
 
@@ -39,7 +39,7 @@ export function voxels(): Part {
 function voxelMesh(map: octomap_msgs_Octomap): VoxelMesh | null {
   const data = Uint8Array.from(map.data, (byte) => byte & 0xff);
   const coloured = map.id === "ColorOcTree";
-  const cubes = occupiedCubes(data, map.resolution, map.binary, MOST, coloured);
+  const cubes = occupiedCubes(data, map.resolution, map.binary, MAX_CUBES, coloured);
   return cubes.count === 0 ? null : meshOf(cubes, frameOf(map.header.frame_id));
 }
 

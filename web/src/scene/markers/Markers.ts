@@ -32,9 +32,9 @@ import { textSprite } from "./text.ts";
 
 const ONE = "visualization_msgs/msg/Marker";
 const MANY = "visualization_msgs/msg/MarkerArray";
-const MOST_SHAPES = 120_000;
-const MOST_LINES = 60_000;
-const MOST_TEXTS = 60;
+const MAX_SHAPES = 120_000;
+const MAX_LINES = 60_000;
+const MAX_TEXTS = 60;
 const REDRAW_MS = 100;
 
 /** Sides of 1, as markers scale them; z is the axis of what is round. */
@@ -45,12 +45,12 @@ const GEOMETRIES: Record<Shape, () => BufferGeometry> = {
   cone: () => new ConeGeometry(0.5, 1, 16).rotateX(Math.PI / 2),
 };
 
-/** Everything that anybody draws with visualization_msgs. */
+/** All markers of visualization_msgs. */
 export class Markers implements Part {
   readonly object = new Group();
   private readonly store = new MarkerStore();
   private readonly drawn = new Group();
-  private readonly lines = new SegmentLines(MOST_LINES, { pixels: false });
+  private readonly lines = new SegmentLines(MAX_LINES, { pixels: false });
   private readonly follower: Follower;
   private shownVersion = 0;
   private framesVersion = 0;
@@ -104,10 +104,10 @@ export class Markers implements Part {
     const pieces = emptyPieces();
     for (const { marker } of this.store.kept.values())
       addPieces(marker, frameOf(marker.header.frame_id), pieces);
-    for (const mesh of shapesOf(pieces.shapes.slice(0, MOST_SHAPES))) this.drawn.add(mesh);
+    for (const mesh of shapesOf(pieces.shapes.slice(0, MAX_SHAPES))) this.drawn.add(mesh);
     if (pieces.triangles.length > 0) this.drawn.add(trianglesOf(pieces.triangles));
-    for (const text of pieces.texts.slice(0, MOST_TEXTS)) this.drawn.add(textSprite(text));
-    const lines = pieces.lines.slice(0, MOST_LINES);
+    for (const text of pieces.texts.slice(0, MAX_TEXTS)) this.drawn.add(textSprite(text));
+    const lines = pieces.lines.slice(0, MAX_LINES);
     lines.forEach(({ from, to, width, colour }, i) => {
       tint.setRGB(colour[0], colour[1], colour[2], SRGBColorSpace).toArray(linear);
       this.lines.put(i, ...from, ...to, width, linear, colour[3]);

@@ -134,15 +134,15 @@ function arrow(
   colour: Rgba,
   out: Pieces,
 ): void {
-  const way = [0, 1, 2].map((i) => to[i]! - from[i]!) as [number, number, number];
-  const length = Math.hypot(...way);
+  const delta = [0, 1, 2].map((i) => to[i]! - from[i]!) as [number, number, number];
+  const length = Math.hypot(...delta);
   if (!(length > 1e-6)) return;
   const long = headLength > 0 ? Math.min(headLength, length) : HEAD_SHARE * length;
   const thick = shaft > 0 ? shaft : SHAFT_M;
   const wide = head > 0 ? head : 2 * thick;
-  const turn = fromUp(way[0] / length, way[1] / length, way[2] / length);
+  const turn = fromUp(delta[0] / length, delta[1] / length, delta[2] / length);
   const along = (share: number) =>
-    [0, 1, 2].map((i) => from[i]! + share * way[i]!) as [number, number, number];
+    [0, 1, 2].map((i) => from[i]! + share * delta[i]!) as [number, number, number];
   const shaftShare = (length - long) / length;
   out.shapes.push({
     shape: "cylinder",

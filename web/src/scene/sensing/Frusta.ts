@@ -22,18 +22,18 @@ import { cameras, type CameraModel } from "./cameras.ts";
 import { bytesOf } from "./pointClouds.ts";
 
 const INFO = "sensor_msgs/msg/CameraInfo";
-const MOST = 24;
+const MAX_CAMERAS = 24;
 const LENGTH_M = 1.2;
 const EDGES = 8;
-const PICTURE_MS = 300;
+const IMAGE_MS = 300;
 const PALE = [0.75, 0.8, 0.9] as const;
 
-/** What cameras see: a pyramid each, and at its end the picture where that is wished. */
+/** What cameras see: a pyramid each, and at its end the image where that is wished. */
 export class Frusta implements Part {
   readonly object = new Group();
-  private readonly lines = new SegmentLines(MOST * EDGES);
+  private readonly lines = new SegmentLines(MAX_CAMERAS * EDGES);
   private readonly follower: Follower;
-  private readonly pictures = new Map<string, Picture>();
+  private readonly images = new Map<string, CameraImage>();
 
   constructor() {
     this.object.add(this.lines.object);
@@ -60,8 +60,8 @@ export class Frusta implements Part {
     const seen = new Set<string>();
     for (const camera of cameras.values()) {
       const own = camera.frame.startsWith(`${selected}/`);
-      if (own && name === "onboard") continue; // nobody sees the pyramid he sits in
-      if (count + EDGES > MOST * EDGES || !this.object.visible) break;
+      if (own && name === "onboard") continue; // from within, the pyramid is not drawn
+      if (count + EDGES > MAX_CAMERAS * EDGES || !this.object.visible) break;
       const pose = link.frames.pose(camera.frame);
       if (pose === null) continue;
       const corners = cornersOf(camera).map(([x, y]) =>
@@ -77,7 +77,7 @@ export class Frusta implements Part {
       });
       if (own && show.pictures) {
         seen.add(camera.topic);
-        this.picture(camera).place(camera, pose);
+        this.imageOf(camera).place(camera, pose);
       }
     }
     this.forget(seen);
@@ -92,22 +92,22 @@ export class Frusta implements Part {
     this.lines.dispose();
   }
 
-  private picture(camera: CameraModel): Picture {
-    let picture = this.pictures.get(camera.topic);
-    if (picture === undefined) {
-      picture = new Picture(camera.topic);
-      this.pictures.set(camera.topic, picture);
-      this.object.add(picture.mesh);
+  private imageOf(camera: CameraModel): CameraImage {
+    let image = this.images.get(camera.topic);
+    if (image === undefined) {
+      image = new CameraImage(camera.topic);
+      this.images.set(camera.topic, image);
+      this.object.add(image.mesh);
     }
-    return picture;
+    return image;
   }
 
   private forget(kept: ReadonlySet<string>): void {
-    for (const [topic, picture] of this.pictures) {
+    for (const [topic, image] of this.images) {
       if (kept.has(topic)) continue;
-      this.object.remove(picture.mesh);
-      picture.dispose();
-      this.pictures.delete(topic);
+      this.object.remove(image.mesh);
+      image.dispose();
+      this.images.delete(topic);
     }
   }
 }
@@ -131,8 +131,8 @@ function cornersOf({ width, height, fx, fy, cx, cy }: CameraModel): [number, num
   ];
 }
 
-/** The newest picture of one camera. */
-class Picture {
+/** The newest image of one camera. */
+class CameraImage {
   readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
   private readonly end: () => void;
 
@@ -152,7 +152,7 @@ class Picture {
             "sensor_msgs/msg/Image",
             ({ message }) => this.take(topic, message),
             {
-              throttleMs: PICTURE_MS,
+              throttleMs: IMAGE_MS,
             },
           );
   }

@@ -34,7 +34,7 @@ const SCAN = "sensor_msgs/msg/LaserScan";
 const CLOUD = "sensor_msgs/msg/PointCloud2";
 const THROTTLE_MS = 50;
 const FADE_S = 1;
-const MOST_PER_SWEEP = 4000;
+const MAX_PER_SWEEP = 4000;
 /** Sensors of the selected UAV and of so many UAVs nearest to it. */
 const NEAREST = 3;
 const FIXED: Record<ReturnColouring, Bytes | null> = {
@@ -111,19 +111,19 @@ export class Returns implements Part {
 
   private begin(topic: string, type: string): (() => void) | null {
     if (!this.near.includes(topic)) return null;
-    // Where a simulation tells the returns themselves they are in place already, nodding included.
+    // Where a simulation publishes the returns themselves they are corrected already, nodding included.
     if (type === SCAN && isKnown(topic.replace(/scan$/, "points"))) return null;
     const take = ({ message }: { message: unknown }) => this.take(topic, type, message);
     return link.subscribe(topic, type, take, { throttleMs: THROTTLE_MS });
   }
 
   private take(topic: string, type: string, message: unknown): void {
-    const most = Math.min(MOST_PER_SWEEP, this.capacity / 4);
+    const maxPoints = Math.min(MAX_PER_SWEEP, this.capacity / 4);
     const { header } = message as sensor_msgs_LaserScan;
     const points =
       type === SCAN
-        ? pointsOfScan(message as sensor_msgs_LaserScan, most)
-        : pointsOfCloud(message as sensor_msgs_PointCloud2, most);
+        ? pointsOfScan(message as sensor_msgs_LaserScan, maxPoints)
+        : pointsOfCloud(message as sensor_msgs_PointCloud2, maxPoints);
     this.add(topic, frameOf(header.frame_id), points);
   }
 

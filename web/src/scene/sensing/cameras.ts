@@ -1,7 +1,7 @@
 import { Quaternion, Vector3 } from "three";
 import { link } from "../../link/link.ts";
 
-/** A camera as its `camera_info` tells. */
+/** A camera as its `camera_info` describes it. */
 export interface CameraModel {
   topic: string;
   frame: string;
@@ -13,7 +13,7 @@ export interface CameraModel {
   cy: number;
 }
 
-/** All cameras that have told of themselves, by topic. */
+/** All cameras whose info was received, by topic. */
 export const cameras = new Map<string, CameraModel>();
 
 /** Optical frames look along z with y down; three's cameras along -z with y up. */
@@ -38,7 +38,7 @@ export function cameraOfUav(
   return false;
 }
 
-const way = new Vector3();
+const axis = new Vector3();
 const turn = new Quaternion();
 
 /** Whether a camera looks rather forward than down. */
@@ -46,5 +46,5 @@ function looksAhead(frame: string): boolean {
   const mount = link.frames.mount(frame);
   if (mount === null) return false;
   const [, , , x, y, z, w] = mount.pose;
-  return way.set(0, 0, 1).applyQuaternion(turn.set(x, y, z, w)).x > 0.5;
+  return axis.set(0, 0, 1).applyQuaternion(turn.set(x, y, z, w)).x > 0.5;
 }

@@ -6,9 +6,9 @@ const FLOAT32 = 7;
 const FLOAT64 = 8;
 
 /** Returns of a level scanner: what lies within its range. */
-export function pointsOfScan(scan: sensor_msgs_LaserScan, most: number): Float32Array {
+export function pointsOfScan(scan: sensor_msgs_LaserScan, maxPoints: number): Float32Array {
   const { ranges, angle_min, angle_increment, range_min, range_max } = scan;
-  const stride = Math.max(1, Math.ceil(ranges.length / Math.max(1, most)));
+  const stride = Math.max(1, Math.ceil(ranges.length / Math.max(1, maxPoints)));
   const out = new Float32Array(3 * Math.ceil(ranges.length / stride));
   let count = 0;
   for (let i = 0; i < ranges.length; i += stride) {
@@ -23,17 +23,17 @@ export function pointsOfScan(scan: sensor_msgs_LaserScan, most: number): Float32
 }
 
 /** Points of a cloud with fields x, y, z of floating point; empty where it has none. */
-export function pointsOfCloud(cloud: sensor_msgs_PointCloud2, most: number): Float32Array {
+export function pointsOfCloud(cloud: sensor_msgs_PointCloud2, maxPoints: number): Float32Array {
   const bytes = bytesOf(cloud.data);
-  const reach = ["x", "y", "z"].map((name) => reader(cloud, name, bytes));
-  const [x, y, z] = reach;
+  const readers = ["x", "y", "z"].map((name) => reader(cloud, name, bytes));
+  const [x, y, z] = readers;
   if (x == null || y == null || z == null || !(cloud.point_step > 0)) return new Float32Array(0);
   const begin = pointBegin(cloud);
   let total = cloud.width * cloud.height;
   if (begin(total - 1) + cloud.point_step > bytes.byteLength) {
     total = wholePoints(cloud, bytes.byteLength); // a message that was cut
   }
-  const stride = Math.max(1, Math.ceil(total / Math.max(1, most)));
+  const stride = Math.max(1, Math.ceil(total / Math.max(1, maxPoints)));
   const out = new Float32Array(3 * Math.ceil(total / stride));
   let count = 0;
   for (let i = 0; i < total; i += stride) {

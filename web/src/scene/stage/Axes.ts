@@ -6,7 +6,7 @@ import { frameOf } from "./frames.ts";
 import { toMap } from "./mapFrame.ts";
 import type { Moment, Part } from "./part.ts";
 
-const MOST = 600;
+const MAX_FRAMES = 600;
 const LENGTH_M = 0.3;
 const COLOURS = [
   [0.9, 0.05, 0.05],
@@ -17,7 +17,7 @@ const COLOURS = [
 /** All frames as small red, green and blue axes: what a graph has of which nothing else is known. */
 export class Axes implements Part {
   readonly object = new Group();
-  private readonly lines = new SegmentLines(3 * MOST);
+  private readonly lines = new SegmentLines(3 * MAX_FRAMES);
 
   constructor() {
     this.object.add(this.lines.object);
@@ -29,7 +29,7 @@ export class Axes implements Part {
     if (!frames) return;
     let count = 0;
     for (const name of link.frames.frameNames()) {
-      if (count >= 3 * MOST) break;
+      if (count >= 3 * MAX_FRAMES) break;
       const pose = frameOf(name);
       const from = toMap(pose, 0, 0, 0);
       COLOURS.forEach((colour, axis) => {

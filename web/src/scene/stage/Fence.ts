@@ -1,4 +1,4 @@
-/** Tells when WebGL has drawn what it was given, without waiting for it. */
+/** Reports when WebGL has drawn what it was given, without waiting for it. */
 export class Fence {
   private sync: WebGLSync | null = null;
 

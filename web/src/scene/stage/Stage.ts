@@ -21,7 +21,7 @@ const LONGEST_STEP_S = 0.1;
 const MEDIUM = 2;
 const LOW = 1;
 
-/** The picture's parts, brought up to date and drawn once a frame. */
+/** The scene's parts, brought up to date and drawn once a frame. */
 export class Stage {
   private readonly air = new Air();
   private readonly parts: Parts;
@@ -81,8 +81,8 @@ export class Stage {
     }
     noteDrawn();
     noteFrame(moment.renderer, moment.camera);
-    if (debugging.firstPictureMs === 0 && this.parts.world.ready)
-      debugging.firstPictureMs = performance.now();
+    if (debugging.firstRenderMs === 0 && this.parts.world.ready)
+      debugging.firstRenderMs = performance.now();
   }
 
   dispose(): void {
@@ -130,8 +130,8 @@ export class Stage {
     return fleet.uavs.flatMap(({ name, row }) => {
       if (row < 0) return [];
       const at = row * POSE;
-      const place = Array.from(shown.poses.subarray(at, at + 3)) as [number, number, number];
-      return [onScreen(name, place, camera, width, height)];
+      const position = Array.from(shown.poses.subarray(at, at + 3)) as [number, number, number];
+      return [onScreen(name, position, camera, width, height)];
     });
   }
 }

@@ -1,4 +1,4 @@
-// `window.volery`: what tests and the benchmark read of the running picture. Nothing in the page
+// `window.volery`: what tests and the benchmark read of the running scene. Nothing in the page
 // depends on it.
 
 import type { PerspectiveCamera, WebGLRenderer } from "three";
@@ -6,10 +6,10 @@ import { Vector3 } from "three";
 
 export interface OnScreen {
   name: string;
-  /** CSS pixels from the picture's top left corner. */
+  /** CSS pixels from the scene's top left corner. */
   x: number;
   y: number;
-  /** Whether it is in front of the camera and within the picture. */
+  /** Whether it is in front of the camera and within the view. */
   visible: boolean;
   /** Map, m. */
   position: [number, number, number];
@@ -21,13 +21,13 @@ export interface Debugging {
   /** Draw calls and triangles of the last frame, shadows included. */
   drawCalls: number;
   triangles: number;
-  /** JavaScript of the last frame, ms: `updateMs` until everything is in place, then the calls to WebGL. */
+  /** JavaScript of the last frame, ms: `updateMs` until everything is updated, then the calls to WebGL. */
   scriptMs: number;
   updateMs: number;
   /** Time between the last two frames, ms. */
   frameMs: number;
   /** `performance.now()` when the first frame with the world in it was drawn; 0: none yet. */
-  firstPictureMs: number;
+  firstRenderMs: number;
   /** What the last frame's work went to, ms by part; only while `detailed` is set. */
   parts: Record<string, number>;
   detailed: boolean;
@@ -58,7 +58,7 @@ export const debugging: Debugging = {
   scriptMs: 0,
   updateMs: 0,
   frameMs: 0,
-  firstPictureMs: 0,
+  firstRenderMs: 0,
   parts: {},
   detailed: false,
   quality: "",
@@ -70,7 +70,7 @@ export const debugging: Debugging = {
 
 const point = new Vector3();
 
-/** Where a place of the map is on the screen. */
+/** Where a position in the map is on the screen. */
 export function onScreen(
   name: string,
   position: [number, number, number],

@@ -31,14 +31,14 @@ export interface Parts {
   sun: Sun;
 }
 
-/** Everything in the picture. A new part: a class below `scene/`, and a line here. */
+/** Everything in the scene. A new part: a class below `scene/`, and a line here. */
 export function makeParts(
   scene: Scene,
   camera: PerspectiveCamera,
   renderer: WebGLRenderer,
   air: Air,
 ): Parts {
-  const most = LEVELS.at(-1)!.particles;
+  const maxParticles = LEVELS.at(-1)!.particles;
   const fixedUrl = new URLSearchParams(location.search).get("world");
   const world = new World(air, renderer, fixedUrl);
   const sun = new Sun(air, (x, y) => currentWorld.ground.heightAt(x, y));
@@ -60,8 +60,8 @@ export function makeParts(
     ["markers", new Markers()],
     ["axes", new Axes()],
     ["sky", new Sky(air)],
-    ["rain", new Precipitation("rain", air, most)],
-    ["snow", new Precipitation("snow", air, most)],
+    ["rain", new Precipitation("rain", air, maxParticles)],
+    ["snow", new Precipitation("snow", air, maxParticles)],
     ["sun", sun],
     ["labels", new Labels()],
   ];

@@ -17,20 +17,22 @@ beforeEach(() => {
   camera.updateMatrixWorld();
   const uav = { airframe: "", mode: "", crashed: false, airborne: true, rotorSpeed: 0 };
   const colour: [number, number, number] = [1, 1, 1];
-  const places = [
+  const positions = [
     [10, 0, 0],
     [10, 8, 4],
     [10, -8, -4],
     [-10, 8, 4],
   ];
-  fleet.uavs = [...places, [NaN, NaN, NaN]].map((_, i) => ({
+  fleet.uavs = [...positions, [NaN, NaN, NaN]].map((_, i) => ({
     ...uav,
     colour,
     name: `uav${i + 1}`,
     row: i,
   }));
   fleet.uavs.push({ ...uav, colour, name: "untold", row: -1 });
-  shown.poses = Float64Array.from([...places, [NaN, NaN, NaN]].flatMap((p) => [...p, 0, 0, 0, 1]));
+  shown.poses = Float64Array.from(
+    [...positions, [NaN, NaN, NaN]].flatMap((p) => [...p, 0, 0, 0, 1]),
+  );
 });
 
 it("a box selects what is seen in it, from whichever corner it is drawn", () => {

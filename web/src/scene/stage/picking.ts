@@ -9,7 +9,7 @@ const BODY_M = 0.35;
 
 const point = new Vector3();
 
-/** Name of the UAV at a place of the picture; empty: none. */
+/** Name of the UAV at a pixel of the view; empty: none. */
 export function pickUav(
   x: number,
   y: number,
@@ -27,15 +27,15 @@ export function pickUav(
     point.project(camera);
     if (!(Math.abs(point.z) < 1)) continue;
     const px = Math.hypot((0.5 + 0.5 * point.x) * width - x, (0.5 - 0.5 * point.y) * height - y);
-    const reach = Math.max(CLOSE_PX, (BODY_M * scale) / away);
-    if (px > reach || px + 0.05 * away > best) continue;
+    const radiusPx = Math.max(CLOSE_PX, (BODY_M * scale) / away);
+    if (px > radiusPx || px + 0.05 * away > best) continue;
     best = px + 0.05 * away;
     name = uav.name;
   }
   return name;
 }
 
-/** Names of the UAVs whose middle is in a box of the picture; two of its corners in CSS pixels. */
+/** Names of the UAVs whose middle is in a box of the view; two of its corners in CSS pixels. */
 export function uavsWithin(
   a: { x: number; y: number },
   b: { x: number; y: number },

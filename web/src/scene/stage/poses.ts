@@ -17,7 +17,7 @@ export function rotationOf(poses: ArrayLike<number>, at: number, out: Float64Arr
   out[8] = 1 - 2 * (x * x + y * y);
 }
 
-/** Matrix number `i` of an instanced mesh: rotation (row by row), scale, place. */
+/** Matrix number `i` of an instanced mesh: rotation (row by row), scale, position. */
 export function putMatrix(
   array: Float32Array | Float64Array | ArrayLike<number>,
   i: number,
@@ -54,8 +54,13 @@ export function product(a: Float64Array, b: Float64Array, out: Float64Array): vo
       out[3 * i + j] = a[3 * i]! * b[j]! + a[3 * i + 1]! * b[3 + j]! + a[3 * i + 2]! * b[6 + j]!;
 }
 
-/** A place given in a turned frame. */
-export function placed(r: Float64Array, v: ArrayLike<number>, at: number, out: Float64Array): void {
+/** A vector given in a rotated frame, in the outer frame. */
+export function rotated(
+  r: Float64Array,
+  v: ArrayLike<number>,
+  at: number,
+  out: Float64Array,
+): void {
   const x = v[at]!;
   const y = v[at + 1]!;
   const z = v[at + 2]!;

@@ -1,18 +1,18 @@
 import type { QualityWish } from "../../state/view.ts";
 
-/** How much work a picture may be. */
+/** How much work a frame may be. */
 export interface Quality {
   name: Exclude<QualityWish, "auto">;
-  /** Most pixels of the picture per CSS pixel. */
+  /** Maximum pixels of the canvas per CSS pixel. */
   pixelRatio: number;
   /** Side of the shadow map; 0: no shadows. */
   shadowMap: number;
-  /** Until here trees are whole, beyond it they are pictures of themselves, m. */
+  /** Until here trees are whole, beyond it they are impostors, m. */
   wholeTreesM: number;
   clouds: boolean;
-  /** Most drops or flakes. */
+  /** Maximum number of drops or flakes. */
   particles: number;
-  /** Most returns of LIDARs at a time. */
+  /** Maximum number of LIDAR returns at a time. */
   returns: number;
 }
 
@@ -76,7 +76,7 @@ export class QualityGovernor {
 
 let software: boolean | null = null;
 
-/** Whether the processor draws WebGL: asked once, before the picture's own context is made. */
+/** Whether the processor draws WebGL: checked once, before the scene's own context is made. */
 export function isSoftware(): boolean {
   software ??= asked();
   return software;

@@ -8,7 +8,7 @@ function frames(): Frames {
   return made;
 }
 
-function tell(to: Frames, x: number, arrivedMs: number, quaternion = [0, 0, 0, 1]): void {
+function publish(to: Frames, x: number, arrivedMs: number, quaternion = [0, 0, 0, 1]): void {
   const poses = Float64Array.from([x, 0, 1, ...quaternion]);
   to.move({ poses, stampS: arrivedMs / 1000, arrivedMs });
 }
@@ -20,21 +20,22 @@ function arrival(i: number): number {
 
 describe("shown poses", () => {
   it("begin with the first message", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
-    tell(told, 3, 1000);
-    shown.update(told, 1000);
+    const [source, shown] = [frames(), new ShownPoses()];
+    publish(source, 3, 1000);
+    shown.update(source, 1000);
     expect(shown.poses[0]).toBe(3);
   });
 
   it("move evenly at 30 Hz: no frame of the screen stands still or leaps", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
+    const [source, shown] = [frames(), new ShownPoses()];
     const speed = 3; // m/s
     const steps: number[] = [];
     let before = NaN;
     let count = 0;
     for (let nowMs = 5; nowMs < 4000; nowMs += 1000 / 60) {
-      for (; arrival(count) <= nowMs; count++) tell(told, (speed * count) / 30, arrival(count));
-      shown.update(told, nowMs);
+      for (; arrival(count) <= nowMs; count++)
+        publish(source, (speed * count) / 30, arrival(count));
+      shown.update(source, nowMs);
       if (nowMs > 2000) steps.push(shown.poses[0]! - before);
       before = shown.poses[0]!;
     }
@@ -43,37 +44,37 @@ describe("shown poses", () => {
   });
 
   it("are at most a period late and never ahead of what is known", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
+    const [source, shown] = [frames(), new ShownPoses()];
     let truth = 0;
     for (let i = 0; i <= 60; i++) {
       truth = i * 0.1;
-      tell(told, truth, i * 33);
+      publish(source, truth, i * 33);
       for (const after of [0, 11, 22, 32]) {
-        shown.update(told, i * 33 + after);
+        shown.update(source, i * 33 + after);
         expect(shown.poses[0]).toBeLessThanOrEqual(truth + 1e-9);
         if (i > 30) expect(shown.poses[0]).toBeGreaterThanOrEqual(truth - 0.1 * 1.05);
       }
     }
-    shown.update(told, 60 * 33 + 5000);
+    shown.update(source, 60 * 33 + 5000);
     expect(shown.poses[0]).toBeCloseTo(truth, 9);
   });
 
-  it("leap where somebody moved the UAV far at once", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
-    tell(told, 0, 0);
-    shown.update(told, 0);
-    tell(told, 50, 33);
-    shown.update(told, 34);
+  it("leap where the UAV was teleported", () => {
+    const [source, shown] = [frames(), new ShownPoses()];
+    publish(source, 0, 0);
+    shown.update(source, 0);
+    publish(source, 50, 33);
+    shown.update(source, 34);
     expect(shown.poses[0]).toBe(50);
   });
 
-  it("turn the shorter way and stay of unit length", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
+  it("turn by the shorter angle and stay of unit length", () => {
+    const [source, shown] = [frames(), new ShownPoses()];
     const half = Math.SQRT1_2;
-    tell(told, 0, 0, [0, 0, half, half]);
-    shown.update(told, 0);
-    tell(told, 0, 33, [0, 0, -1, 0]); // 180 degrees, told with the other sign
-    shown.update(told, 33 + 16);
+    publish(source, 0, 0, [0, 0, half, half]);
+    shown.update(source, 0);
+    publish(source, 0, 33, [0, 0, -1, 0]); // 180 degrees, published with the other sign
+    shown.update(source, 33 + 16);
     const [z, w] = [shown.poses[5]!, shown.poses[6]!];
     expect(Math.hypot(z, w)).toBeCloseTo(1, 9);
     const yaw = 2 * Math.atan2(z, w);
@@ -82,16 +83,16 @@ describe("shown poses", () => {
   });
 
   it("survive what is no number, and more rows", () => {
-    const [told, shown] = [frames(), new ShownPoses()];
-    tell(told, NaN, 0);
-    shown.update(told, 0);
-    tell(told, 2, 33);
-    shown.update(told, 50);
+    const [source, shown] = [frames(), new ShownPoses()];
+    publish(source, NaN, 0);
+    shown.update(source, 0);
+    publish(source, 2, 33);
+    shown.update(source, 50);
     expect(shown.poses[0]).toBe(2);
-    told.rename({ names: ["a", "b"], fixed: [] });
-    shown.update(told, 60); // the rows have not come yet
-    told.move({ poses: new Float64Array(14).fill(1), stampS: 1, arrivedMs: 70 });
-    shown.update(told, 70);
+    source.rename({ names: ["a", "b"], fixed: [] });
+    shown.update(source, 60); // the rows have not come yet
+    source.move({ poses: new Float64Array(14).fill(1), stampS: 1, arrivedMs: 70 });
+    shown.update(source, 70);
     expect(shown.poses.length).toBe(14);
   });
 });

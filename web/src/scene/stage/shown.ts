@@ -3,13 +3,13 @@ import { POSE } from "../../link/protocol.ts";
 
 const SHORTEST_MS = 4;
 const LONGEST_MS = 400;
-/** A step farther than this, and faster than that, was a leap: somebody moved it. */
+/** A step farther than this, and faster than that, was a leap: a teleport. */
 const LEAP_M = 1.5;
 const LEAP_M_S = 60;
 
 /**
- * The poses that the picture shows: on their way from where they were shown when the newest message
- * came to what it said, in the time that messages take to follow each other. They arrive when the
+ * The poses that the scene shows: moving from where they were shown when the newest message came to
+ * what it said, in the time that messages take to follow each other. They arrive when the
  * next one is due, stand still when it is late, and never run ahead of what is known.
  */
 export class ShownPoses {
@@ -34,7 +34,7 @@ export class ShownPoses {
     this.moveOn(nowMs);
   }
 
-  /** Share of the way that is done, 0 to 1. */
+  /** Fraction of the motion that is done, 0 to 1. */
   private share(nowMs: number): number {
     return Math.min(1, Math.max(0, (nowMs - this.arrivedMs) / this.periodMs));
   }
@@ -101,5 +101,5 @@ function turn(
   for (let i = at; i < at + 4; i++) out[i]! *= scale;
 }
 
-/** Those of the page's one picture. */
+/** Those of the page's one scene. */
 export const shown = new ShownPoses();

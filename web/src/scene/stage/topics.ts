@@ -1,5 +1,5 @@
-// Which topics there are: asked of rosapi every few seconds, for the layers that show whatever is
-// told somewhere.
+// Which topics there are: requested from rosapi every few seconds, for the layers that show every
+// topic of a type.
 
 import { link } from "../../link/link.ts";
 

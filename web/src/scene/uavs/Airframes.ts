@@ -12,11 +12,11 @@ import {
 } from "three";
 import { FADE } from "../air/fog.ts";
 import { POSE } from "../../link/protocol.ts";
-import { placed, product, putMatrix, rotationOf } from "../stage/poses.ts";
+import { rotated, product, putMatrix, rotationOf } from "../stage/poses.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import type { AirframeShape } from "./airframes.generated.ts";
-import { bladesOf, bodyOf, reachOf, shapeOf } from "./airframeGeometry.ts";
+import { bladesOf, bodyOf, radiusOf, shapeOf } from "./airframeGeometry.ts";
 import { CRASHED } from "./colours.ts";
 import { Dots } from "./Dots.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
@@ -85,13 +85,13 @@ export class Airframes implements Part {
 const rotation = new Float64Array(9);
 const turned = new Float64Array(9);
 const spun = new Float64Array(9);
-const place = new Float64Array(3);
+const offset = new Float64Array(3);
 
 /** All UAVs of one airframe. */
 class Kind {
   readonly meshes: InstancedMesh[];
   private readonly shape: AirframeShape;
-  private readonly reach: number;
+  private readonly radius: number;
   private readonly body: InstancedMesh<BufferGeometry, MeshStandardMaterial>;
   private readonly blades: InstancedMesh;
   private readonly discs: InstancedMesh;
@@ -106,7 +106,7 @@ class Kind {
     private readonly members: readonly number[],
   ) {
     this.shape = shapeOf(airframe);
-    this.reach = reachOf(airframe);
+    this.radius = radiusOf(airframe);
     const rotors = members.length * this.shape.rotors.length;
     this.body = instanced(new InstancedMesh(bodyOf(airframe), painted(), members.length));
     const white = new Float32Array(3 * members.length).fill(1);
@@ -149,7 +149,7 @@ class Kind {
       (this.angles[i]! + Math.sqrt(speed) * SPIN_RAD_S * sight.stepS) % (2 * Math.PI);
     const [x, y, z] = [poses[at]!, poses[at + 1]!, poses[at + 2]!];
     const { eye } = sight;
-    const radiusPx = (this.reach * sight.scale) / Math.hypot(x - eye.x, y - eye.y, z - eye.z);
+    const radiusPx = (this.radius * sight.scale) / Math.hypot(x - eye.x, y - eye.y, z - eye.z);
     if (radiusPx < DOT_PX) {
       sight.dots.put(x, y, z, uav.crashed ? CRASHED : uav.colour);
       return;
@@ -166,12 +166,12 @@ class Kind {
     const { rotors, rotorRadius } = this.shape;
     const blurred = speed > BLUR;
     for (const rotor of rotors) {
-      placed(rotation, rotor, 0, place);
+      rotated(rotation, rotor, 0, offset);
       leaning(rotor, turned);
       product(rotation, turned, spun);
       spin(spun, angle * rotor[6]!);
       const at = this.rotors++;
-      const [px, py, pz] = [x + place[0]!, y + place[1]!, z + place[2]!];
+      const [px, py, pz] = [x + offset[0]!, y + offset[1]!, z + offset[2]!];
       putMatrix(this.blades.instanceMatrix.array, at, spun, rotorRadius, px, py, pz);
       putMatrix(this.discs.instanceMatrix.array, at, spun, blurred ? rotorRadius : 0, px, py, pz);
     }

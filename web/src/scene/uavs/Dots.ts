@@ -12,7 +12,7 @@ import { FADE } from "../air/fog.ts";
 /** UAVs too far away for a shape: a dot of one size each, in one draw call. */
 export class Dots {
   readonly object: Points<BufferGeometry, ShaderMaterial>;
-  private readonly places: BufferAttribute;
+  private readonly positions: BufferAttribute;
   private readonly tints: BufferAttribute;
   private count = 0;
 
@@ -23,7 +23,7 @@ export class Dots {
     const geometry = new BufferGeometry();
     const attribute = () =>
       new BufferAttribute(new Float32Array(3 * capacity), 3).setUsage(DynamicDrawUsage);
-    geometry.setAttribute("position", (this.places = attribute()));
+    geometry.setAttribute("position", (this.positions = attribute()));
     geometry.setAttribute("tint", (this.tints = attribute()));
     const material = new ShaderMaterial({
       vertexShader: VERTEX,
@@ -40,7 +40,7 @@ export class Dots {
   }
 
   put(x: number, y: number, z: number, [r, g, b]: readonly [number, number, number]): void {
-    this.places.setXYZ(this.count, x, y, z);
+    this.positions.setXYZ(this.count, x, y, z);
     this.tints.setXYZ(this.count++, r, g, b);
   }
 
@@ -48,7 +48,7 @@ export class Dots {
   end(pixelRatio: number): void {
     this.object.visible = this.count > 0;
     this.object.geometry.setDrawRange(0, this.count);
-    this.places.needsUpdate = this.tints.needsUpdate = this.count > 0;
+    this.positions.needsUpdate = this.tints.needsUpdate = this.count > 0;
     this.object.material.uniforms.size!.value = 2 * this.radiusPx * pixelRatio;
   }
 

@@ -17,19 +17,19 @@ import { useView } from "../../state/view.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet, type ShownUav } from "./fleet.ts";
-import { chooseLabels, MOST_LABELS, type Box } from "./labelPositions.ts";
+import { chooseLabels, MAX_LABELS, type Box } from "./labelPositions.ts";
 import { NameCells } from "./nameCells.ts";
 
-/** Pixels of one name in the picture of names. */
+/** Pixels of one name in the texture of names. */
 const CELL = { width: 192, height: 32 };
 const COLUMNS = 8;
-/** Names in the picture: those that are shown, and some that were and may be again. */
-const CELLS = 2 * MOST_LABELS;
+/** Names in the texture: those that are shown, and some that were and may be again. */
+const CELLS = 2 * MAX_LABELS;
 const ROWS = CELLS / COLUMNS;
 const FONT = "600 21px Inter, system-ui, sans-serif";
 const HEIGHT_PX = 17;
 const MARGIN_PX = 10;
-/** Names are chosen anew so often, ms: which of them would overlap changes slowly. */
+/** Names are chosen again so often, ms: which of them would overlap changes slowly. */
 const CHOOSE_MS = 120;
 const ABOVE_M = 0.12;
 
@@ -71,7 +71,7 @@ export class Labels implements Part {
       this.chosen = this.choose(moment, names);
       this.write(this.chosen.map((i) => fleet.uavs[i]!.name));
     }
-    this.place(moment);
+    this.arrange(moment);
   }
 
   dispose(): void {
@@ -80,7 +80,7 @@ export class Labels implements Part {
     this.mesh.material.dispose();
   }
 
-  /** Write names into the picture that are not in it. */
+  /** Write names into the texture that are not in it. */
   private write(names: readonly string[]): void {
     const fresh = this.cells.hold(names);
     const context = this.canvas.getContext("2d");
@@ -134,9 +134,9 @@ export class Labels implements Part {
     return chooseLabels(boxes);
   }
 
-  private place({ width, height }: Moment): void {
+  private arrange({ width, height }: Moment): void {
     const { geometry, material } = this.mesh;
-    const place = geometry.getAttribute("place") as InstancedBufferAttribute;
+    const origin = geometry.getAttribute("origin") as InstancedBufferAttribute;
     const look = geometry.getAttribute("look") as InstancedBufferAttribute;
     const tint = geometry.getAttribute("tint") as InstancedBufferAttribute;
     const { selected } = useVehicles.getState();
@@ -145,7 +145,7 @@ export class Labels implements Part {
       const uav = fleet.uavs[i];
       if (uav === undefined || uav.row < 0) continue;
       const at = uav.row * POSE;
-      place.setXYZ(count, shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]! + ABOVE_M);
+      origin.setXYZ(count, shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]! + ABOVE_M);
       const cell = this.cells.cellOf(uav.name);
       look.setXYZ(count, this.widthOf(uav.name), cell % COLUMNS, Math.floor(cell / COLUMNS));
       tint.setXYZ(count, ...tintOf(uav, selected));
@@ -153,7 +153,7 @@ export class Labels implements Part {
     }
     geometry.instanceCount = count;
     this.mesh.visible = count > 0;
-    for (const attribute of [place, look, tint]) attribute.needsUpdate = true;
+    for (const attribute of [origin, look, tint]) attribute.needsUpdate = true;
     material.uniforms.size!.value.set(width, height);
   }
 
@@ -179,20 +179,20 @@ function geometryOf(): InstancedBufferGeometry {
   const corners = new Float32Array([-0.5, 0, 0, 0.5, 0, 0, 0.5, 1, 0, -0.5, 1, 0]);
   geometry.setAttribute("position", new BufferAttribute(corners, 3));
   geometry.setIndex([0, 1, 2, 0, 2, 3]);
-  for (const name of ["place", "look", "tint"]) {
-    const attribute = new InstancedBufferAttribute(new Float32Array(3 * MOST_LABELS), 3);
+  for (const name of ["origin", "look", "tint"]) {
+    const attribute = new InstancedBufferAttribute(new Float32Array(3 * MAX_LABELS), 3);
     geometry.setAttribute(name, attribute.setUsage(DynamicDrawUsage));
   }
   return geometry;
 }
 
 const VERTEX = /* glsl */ `
-attribute vec3 place, look, tint;
+attribute vec3 origin, look, tint;
 uniform vec2 size;
 varying vec2 vUv;
 varying vec3 vTint;
 void main() {
-  vec4 at = projectionMatrix * viewMatrix * vec4(place, 1.0);
+  vec4 at = projectionMatrix * viewMatrix * vec4(origin, 1.0);
   vec2 pixels = vec2(position.x * look.x, position.y) * ${HEIGHT_PX.toFixed(1)} + vec2(0.0, ${MARGIN_PX.toFixed(1)});
   at.xy += pixels * 2.0 / size * at.w;
   gl_Position = at;

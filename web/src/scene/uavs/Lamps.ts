@@ -8,7 +8,7 @@ import {
 } from "three";
 import { POSE } from "../../link/protocol.ts";
 import type { Air } from "../air/air.ts";
-import { placed, rotationOf } from "../stage/poses.ts";
+import { rotated, rotationOf } from "../stage/poses.ts";
 import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { shapeOf } from "./airframeGeometry.ts";
@@ -20,9 +20,9 @@ const COLOURS = [
   [0.05, 1, 0.15],
   [1, 1, 0.95],
 ] as const;
-const MOST = 1024;
+const MAX_UAVS = 1024;
 const rotation = new Float64Array(9);
-const place = new Float64Array(3);
+const offset = new Float64Array(3);
 
 /** Position lights of all UAVs; at night they are what one sees of them. */
 export class Lamps implements Part {
@@ -31,13 +31,15 @@ export class Lamps implements Part {
 
   constructor(private readonly air: Air) {
     const geometry = new BufferGeometry();
-    const count = MOST * COLOURS.length;
-    const places = new BufferAttribute(new Float32Array(3 * count), 3).setUsage(DynamicDrawUsage);
+    const count = MAX_UAVS * COLOURS.length;
+    const positions = new BufferAttribute(new Float32Array(3 * count), 3).setUsage(
+      DynamicDrawUsage,
+    );
     const colours = Float32Array.from(
       { length: 3 * count },
       (_, i) => COLOURS[Math.floor(i / 3) % 3]![i % 3]!,
     );
-    geometry.setAttribute("position", places);
+    geometry.setAttribute("position", positions);
     geometry.setAttribute("tint", new BufferAttribute(colours, 3));
     const material = new ShaderMaterial({
       vertexShader: VERTEX,
@@ -54,27 +56,34 @@ export class Lamps implements Part {
 
   update({ height, camera, renderer }: Moment): void {
     const strength = 0.12 + 0.88 * this.air.light.night;
-    const places = this.object.geometry.getAttribute("position") as BufferAttribute;
+    const positions = this.object.geometry.getAttribute("position") as BufferAttribute;
     let count = 0;
     for (const { row, airframe, crashed } of fleet.uavs) {
       const at = row * POSE;
-      if (at < 0 || crashed || count >= COLOURS.length * MOST || !Number.isFinite(shown.poses[at]))
+      if (
+        at < 0 ||
+        crashed ||
+        count >= COLOURS.length * MAX_UAVS ||
+        !Number.isFinite(shown.poses[at])
+      )
         continue;
       rotationOf(shown.poses, at, rotation);
-      const reach =
+      const distance =
         0.75 * Math.hypot(shapeOf(airframe).rotors[0]![0]!, shapeOf(airframe).rotors[0]![1]!);
       for (let k = 0; k < 3; k++) {
         this.lamp.set(
-          k === 2 ? [-reach, 0, 0] : [0.7 * reach, k === 0 ? 0.7 * reach : -0.7 * reach, 0],
+          k === 2
+            ? [-distance, 0, 0]
+            : [0.7 * distance, k === 0 ? 0.7 * distance : -0.7 * distance, 0],
         );
-        placed(rotation, this.lamp, 0, place);
+        rotated(rotation, this.lamp, 0, offset);
         const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
-        places.setXYZ(count++, x + place[0]!, y + place[1]!, z + place[2]!);
+        positions.setXYZ(count++, x + offset[0]!, y + offset[1]!, z + offset[2]!);
       }
     }
     this.object.geometry.setDrawRange(0, count);
     this.object.visible = count > 0;
-    places.needsUpdate = true;
+    positions.needsUpdate = true;
     const { uniforms } = this.object.material;
     uniforms.strength!.value = strength;
     uniforms.extinction!.value = this.air.light.extinction;

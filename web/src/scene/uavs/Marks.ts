@@ -13,9 +13,9 @@ import { fleet, type ShownUav } from "./fleet.ts";
 const SIDES = 28;
 /** Rings of a group are coarser: there may be hundreds. */
 const GROUP_SIDES = 8;
-const MOST_WRECKS = 32;
-const MOST_OF_GROUP = 2048;
-const SEGMENTS = (MOST_WRECKS + 1) * (SIDES + 2) + MOST_OF_GROUP * GROUP_SIDES;
+const MAX_WRECKS = 32;
+const MAX_GROUP = 2048;
+const SEGMENTS = (MAX_WRECKS + 1) * (SIDES + 2) + MAX_GROUP * GROUP_SIDES;
 
 /**
  * A ring around each selected UAV, and a line to the ground below the one that the Inspector shows;
@@ -37,11 +37,11 @@ export class Marks implements Part {
     let wrecks = 0;
     for (const uav of fleet.uavs) {
       const isSelected = uav.name === selected;
-      if (isSelected && onboard && !uav.crashed) continue; // nobody sees the ring he sits in
-      if (!isSelected && !(uav.crashed && wrecks++ < MOST_WRECKS)) continue;
+      if (isSelected && onboard && !uav.crashed) continue; // from within, the ring is not drawn
+      if (!isSelected && !(uav.crashed && wrecks++ < MAX_WRECKS)) continue;
       this.mark(uav, uav.crashed ? CRASHED : SELECTED, isSelected);
     }
-    for (const name of group.slice(0, MOST_OF_GROUP)) {
+    for (const name of group.slice(0, MAX_GROUP)) {
       const uav = name === selected ? undefined : fleet.named(name);
       if (uav !== undefined) this.ring(uav, GROUP_SIDES, SELECTED);
     }

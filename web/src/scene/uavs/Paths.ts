@@ -131,20 +131,20 @@ function read(type: string, message: unknown): { points: Float64Array; untilMs: 
   const FOREVER = Infinity;
   if (type === "nav_msgs/msg/Path") {
     const { header, poses } = message as nav_msgs_Path;
-    const places = poses.map(({ pose }) => pose.position);
-    return { points: inMap(header.frame_id, places), untilMs: FOREVER };
+    const positions = poses.map(({ pose }) => pose.position);
+    return { points: inMap(header.frame_id, positions), untilMs: FOREVER };
   }
   if (type === "geometry_msgs/msg/PoseStamped") {
     const { header, pose } = message as geometry_msgs_PoseStamped;
     return { points: inMap(header.frame_id, [pose.position]), untilMs: nowMs() + 30_000 };
   }
   const { header, points } = message as trajectory_msgs_MultiDOFJointTrajectory;
-  const places = points.flatMap(({ transforms }) =>
+  const positions = points.flatMap(({ transforms }) =>
     transforms.slice(0, 1).map((t) => t.translation),
   );
   const last = points.at(-1);
   const seconds = last === undefined ? 0 : secondsOf(last.time_from_start);
-  return { points: inMap(header.frame_id, places), untilMs: nowMs() + 1000 * (seconds + 5) };
+  return { points: inMap(header.frame_id, positions), untilMs: nowMs() + 1000 * (seconds + 5) };
 }
 
 /** Three strokes through a goal. */

@@ -2,12 +2,12 @@ import { DynamicDrawUsage, Group, InstancedMesh, MeshStandardMaterial } from "th
 import { link } from "../../link/link.ts";
 import { POSE } from "../../link/protocol.ts";
 import type { Part } from "../stage/part.ts";
-import { placed, product, putMatrix, rotationOf } from "../stage/poses.ts";
+import { rotated, product, putMatrix, rotationOf } from "../stage/poses.ts";
 import { shown } from "../stage/shown.ts";
 import { cameraBody, lidarBody } from "./airframeGeometry.ts";
 import { fleet } from "./fleet.ts";
 
-/** Frames that have a body: what their names tell, optical frames being the same camera again. */
+/** Frames that have a body: by their names; optical frames being the same camera again. */
 const LIDAR = /(?:laser|lidar|velodyne|scanner|ouster)/i;
 const CAMERA = /(?:camera|cam_|_cam|front|down)/i;
 const NO_BODY = /optical|base_link|odom|imu|gnss|gps|sonar|range|baro|magnet/i;
@@ -97,7 +97,7 @@ function place(mesh: InstancedMesh, i: number, { row, pose }: Mount): void {
   rotationOf(poses, at, base);
   rotationOf(pose, 0, own);
   product(base, own, both);
-  placed(base, pose, 0, offset);
+  rotated(base, pose, 0, offset);
   putMatrix(
     mesh.instanceMatrix.array,
     i,

@@ -8,7 +8,7 @@ import { shown } from "../stage/shown.ts";
 import { fleet } from "./fleet.ts";
 
 const PUFFS = 14;
-const MOST_WRECKS = 32;
+const MAX_WRECKS = 32;
 const RISE_S = 4;
 
 /** Smoke over UAVs that have crashed. */
@@ -16,7 +16,7 @@ export class Smoke implements Part {
   readonly object: ParticleMesh;
 
   constructor(private readonly air: Air) {
-    const count = PUFFS * MOST_WRECKS;
+    const count = PUFFS * MAX_WRECKS;
     this.object = particleMesh({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
@@ -26,7 +26,7 @@ export class Smoke implements Part {
         light: { value: new Vector3() },
       },
       attributes: {
-        place: { size: 3, values: new Float32Array(3 * count) },
+        origin: { size: 3, values: new Float32Array(3 * count) },
         phase: {
           size: 1,
           values: Float32Array.from({ length: count }, (_, i) => (i % PUFFS) / PUFFS),
@@ -37,19 +37,19 @@ export class Smoke implements Part {
   }
 
   update({ nowMs }: Moment): void {
-    const place = this.object.geometry.getAttribute("place") as InstancedBufferAttribute;
+    const origin = this.object.geometry.getAttribute("origin") as InstancedBufferAttribute;
     let wrecks = 0;
     for (const { crashed, row } of fleet.uavs) {
       const at = row * POSE;
-      if (!crashed || at < 0 || wrecks >= MOST_WRECKS) continue;
+      if (!crashed || at < 0 || wrecks >= MAX_WRECKS) continue;
       const [x, y, z] = [shown.poses[at]!, shown.poses[at + 1]!, shown.poses[at + 2]!];
-      for (let k = wrecks * PUFFS; k < (wrecks + 1) * PUFFS; k++) place.setXYZ(k, x, y, z);
+      for (let k = wrecks * PUFFS; k < (wrecks + 1) * PUFFS; k++) origin.setXYZ(k, x, y, z);
       wrecks++;
     }
     this.object.visible = wrecks > 0;
     if (wrecks === 0) return;
     this.object.geometry.instanceCount = wrecks * PUFFS;
-    place.needsUpdate = true;
+    origin.needsUpdate = true;
     const { timeS, wind, light } = this.object.material.uniforms;
     timeS!.value = (nowMs / 1000) % 3600;
     wind!.value.set(this.air.weather.wind[0], this.air.weather.wind[1]);
@@ -63,7 +63,7 @@ export class Smoke implements Part {
 
 const VERTEX = /* glsl */ `
 #include <fog_pars_vertex>
-attribute vec3 place;
+attribute vec3 origin;
 attribute float phase;
 uniform float timeS;
 uniform vec2 wind;
@@ -72,7 +72,7 @@ varying float vAge;
 void main() {
   float age = fract(timeS / ${RISE_S.toFixed(1)} + phase);
   float wobble = 12.0 * phase + timeS;
-  vec3 p = place + vec3(wind * age * 1.2, 1.9 * age) + 0.12 * vec3(sin(wobble), cos(1.3 * wobble), 0.0) * age;
+  vec3 p = origin + vec3(wind * age * 1.2, 1.9 * age) + 0.12 * vec3(sin(wobble), cos(1.3 * wobble), 0.0) * age;
   vec4 mvPosition = viewMatrix * vec4(p, 1.0);
   mvPosition.xy += position.xy * (0.1 + 0.45 * age);
   vOn = position.xy;

@@ -51,14 +51,14 @@ beforeEach(() => {
   shown.poses = new Float64Array(14);
 });
 
-it("the trail of a UAV that is put back to its start begins anew, that of another goes on", () => {
+it("the trail of a UAV that is put back to its start begins again, that of another goes on", () => {
   const trails = new Trails();
   fly(trails, 0, 10);
   expect([trails.lengthOf("uav1"), trails.lengthOf("uav2")]).toEqual([19, 19]);
   const stamp = { sec: 0, nanosec: Math.round(link.frames.stampS * 1e9) };
   const command = { kind: "call", name: "/volery/reset_uav", content: '{"name": "uav1"}' };
   listeners.get("/volery/log")!({ message: { ...command, stamp, client: "" } });
-  fly(trails, 10, 12.5); // in the half second that the picture needs there is no trail
+  fly(trails, 10, 12.5); // in the half second that the scene needs there is no trail
   expect([trails.lengthOf("uav1"), trails.lengthOf("uav2")]).toEqual([0, 24]);
   expect(drawnReds(trails)).toBe(0);
   fly(trails, 12.5, 20);
@@ -67,7 +67,7 @@ it("the trail of a UAV that is put back to its start begins anew, that of anothe
   expect(trails.lengthOf("uav1")).toBeLessThan(16);
 });
 
-it("all trails begin anew with an epoch", () => {
+it("all trails begin again with an epoch", () => {
   const trails = new Trails();
   fly(trails, 0, 10);
   useEpoch.setState({ epoch: 7 });

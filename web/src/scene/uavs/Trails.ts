@@ -9,11 +9,11 @@ import type { Moment, Part } from "../stage/part.ts";
 import { shown } from "../stage/shown.ts";
 import { fleet } from "./fleet.ts";
 
-/** Most segments of all trails together, and for each UAV of a small fleet. */
+/** Maximum number of segments of all trails together, and for each UAV of a small fleet. */
 const SEGMENTS = 20_000;
 const LONGEST = 400;
 const FADE_S = 60;
-/** Least length of a segment, while there are `LONGEST` for each UAV. */
+/** Minimum length of a segment, while there are `LONGEST` for each UAV. */
 const SHORTEST_M = 0.12;
 /** A step as long as this was a leap and leaves no trail, m. */
 const LEAP_M = 4;
@@ -79,7 +79,7 @@ export class Trails implements Part {
     this.lines.clear();
   }
 
-  /** Drop the trail of one UAV; it begins anew with its next place. */
+  /** Drop the trail of one UAV; it begins again with its next position. */
   private forget(i: number): void {
     this.ends.fill(NaN, 3 * i, 3 * i + 3);
     for (let slot = this.owners.indexOf(i); slot >= 0; slot = this.owners.indexOf(i, slot + 1)) {
@@ -118,7 +118,7 @@ export class Trails implements Part {
     ends[3 * i] = x;
     ends[3 * i + 1] = y;
     ends[3 * i + 2] = z;
-    if (!(step < LEAP_M)) return; // also the first place of all
+    if (!(step < LEAP_M)) return; // also the first position of all
     const slot = this.drawn++ % this.capacity;
     this.owners[slot] = i;
     this.lines.put(slot, ax, ay, az, x, y, z, WIDTH_PX, uav.colour, 0.85, nowS);

@@ -23,17 +23,17 @@ export function shapeOf(airframe: string): AirframeShape {
   return ownEntry(AIRFRAMES, airframe) ?? AIRFRAMES.f450!;
 }
 
-const reaches = new Map<string, number>();
+const radii = new Map<string, number>();
 
 /** From the middle of an airframe to the tips of its outermost rotor, m. */
-export function reachOf(airframe: string): number {
-  let reach = reaches.get(airframe);
-  if (reach === undefined) {
+export function radiusOf(airframe: string): number {
+  let radius = radii.get(airframe);
+  if (radius === undefined) {
     const { rotors, rotorRadius } = shapeOf(airframe);
-    reach = rotorRadius + Math.max(...rotors.map(([x, y]) => Math.hypot(x!, y!)));
-    reaches.set(airframe, reach);
+    radius = rotorRadius + Math.max(...rotors.map(([x, y]) => Math.hypot(x!, y!)));
+    radii.set(airframe, radius);
   }
-  return reach;
+  return radius;
 }
 
 /**
@@ -74,9 +74,9 @@ function arm(
   const [x, y, z] = rotor as [number, number, number];
   const length = Math.hypot(x, y);
   const thick = Math.max(0.012 * length, 0.1 * length);
-  const seat = z - 0.16 * rotorRadius;
-  const from = new Vector3(0.12 * x, 0.12 * y, Math.min(seat, 0.18 * size[2]));
-  const to = new Vector3(x, y, seat);
+  const motorZ = z - 0.16 * rotorRadius;
+  const from = new Vector3(0.12 * x, 0.12 * y, Math.min(motorZ, 0.18 * size[2]));
+  const to = new Vector3(x, y, motorZ);
   return [
     bar(from, to, thick, 0.6 * thick, x > 0.01 * length ? colours.front : colours.back),
     cylinder(0.13 * rotorRadius, 0.22 * rotorRadius, [x, y, z - 0.12 * rotorRadius], "#3d4045"),
@@ -86,8 +86,8 @@ function arm(
 
 function leg({ size, rotors }: AirframeShape, foot: readonly number[], { legs }: AirframeColours) {
   const [x, y, z] = foot as [number, number, number];
-  const reach = Math.max(...rotors.map(([rx, ry]) => Math.hypot(rx!, ry!)));
-  const thick = 0.045 * reach;
+  const radius = Math.max(...rotors.map(([rx, ry]) => Math.hypot(rx!, ry!)));
+  const thick = 0.045 * radius;
   const top = new Vector3(0.7 * x, 0.7 * y, -0.1 * size[2]);
   return [
     bar(top, new Vector3(x, y, z + 0.5 * thick), thick, thick, legs),
@@ -100,12 +100,12 @@ export function bladesOf(): BufferGeometry {
   const blades = [1, -1].map((side) => {
     const blade = new BoxGeometry(0.92, 0.16, 0.02, 3, 1, 1);
     blade.translate(0.52, 0, 0);
-    const place = blade.getAttribute("position");
-    for (let i = 0; i < place.count; i++) {
-      const x = place.getX(i);
+    const position = blade.getAttribute("position");
+    for (let i = 0; i < position.count; i++) {
+      const x = position.getX(i);
       const chord = 1.15 - 0.75 * x;
-      place.setY(i, place.getY(i) * chord);
-      place.setZ(i, place.getZ(i) + place.getY(i) * 0.35 * (1 - 0.6 * x));
+      position.setY(i, position.getY(i) * chord);
+      position.setZ(i, position.getZ(i) + position.getY(i) * 0.35 * (1 - 0.6 * x));
     }
     if (side < 0) blade.rotateZ(Math.PI);
     return painted(blade, "#101114");

@@ -6,7 +6,7 @@ import { colourOf, linearOf } from "./colours.ts";
 
 export interface ShownUav {
   name: string;
-  /** Row of its pose in `shown.poses`; -1: not told yet. */
+  /** Row of its pose in `shown.poses`; -1: not received yet. */
   row: number;
   airframe: string;
   mode: string;
@@ -22,7 +22,7 @@ const BASE = /^(?:(.+)\/)?base_link$/;
 /** What a UAV is drawn as of which only the frame is known. */
 const UNKNOWN = "";
 
-/** The UAVs in the picture: those that the simulation tells of, else every `base_link`. */
+/** The UAVs in the scene: those that the simulation publishes, else every `base_link`. */
 export class ShownFleet {
   uavs: ShownUav[] = [];
   /** Grows when another UAV, row or airframe is in the list. */
@@ -31,7 +31,7 @@ export class ShownFleet {
   coloured = false;
 
   private framesVersion = -1;
-  private told: unknown = null;
+  private vehicles: unknown = null;
   private colouring: unknown = null;
   private byName = new Map<string, ShownUav>();
 
@@ -40,11 +40,11 @@ export class ShownFleet {
     const { list } = useVehicles.getState();
     const { version } = link.frames;
     const colouring = useColouring.getState();
-    if (list === this.told && version === this.framesVersion && colouring === this.colouring)
+    if (list === this.vehicles && version === this.framesVersion && colouring === this.colouring)
       return;
     this.colouring = colouring;
     this.coloured = colouring.by !== "uav" && list.length > 0;
-    this.told = list;
+    this.vehicles = list;
     this.framesVersion = version;
     const next = list.length > 0 ? fromVehicles() : fromFrames();
     const alike =
@@ -87,5 +87,5 @@ function fromFrames(): ShownUav[] {
   });
 }
 
-/** Those of the page's one picture. */
+/** Those of the page's one scene. */
 export const fleet = new ShownFleet();

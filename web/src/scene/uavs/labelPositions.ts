@@ -8,15 +8,15 @@ export interface Box {
   rank: number;
 }
 
-/** More names than these only hide the picture. */
-export const MOST_LABELS = 48;
+/** More names than these only hide the scene. */
+export const MAX_LABELS = 48;
 const GAP_PX = 2;
 
 /** Ids of boxes none of which overlaps another, those of higher rank first. */
 export function chooseLabels(boxes: readonly Box[]): number[] {
   const kept: Box[] = [];
   for (const box of [...boxes].sort((a, b) => b.rank - a.rank)) {
-    if (kept.length >= MOST_LABELS) break;
+    if (kept.length >= MAX_LABELS) break;
     if (!kept.some((other) => overlap(box, other))) kept.push(box);
   }
   return kept.map(({ id }) => id);

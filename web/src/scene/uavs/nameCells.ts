@@ -1,4 +1,4 @@
-/** Which name is in which cell of a picture with room for few of many names. */
+/** Which name is in which cell of a texture with room for few of many names. */
 export class NameCells {
   /** The longest unused one first. */
   private readonly cells = new Map<string, number>();
@@ -10,7 +10,7 @@ export class NameCells {
     return this.cells.get(name) ?? -1;
   }
 
-  /** Give each name a cell, `capacity` at most; those that came anew, with the cell to write them to. */
+  /** Give each name a cell, `capacity` at most; those that are new, with the cell to write them to. */
   hold(names: readonly string[]): [string, number][] {
     for (const name of names) {
       const cell = this.cells.get(name);

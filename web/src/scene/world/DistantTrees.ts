@@ -17,15 +17,15 @@ import type { Air } from "../air/air.ts";
 import { FADE } from "../air/fog.ts";
 import type { Model, Surface } from "./readWorld.ts";
 import type { Chosen } from "./treeCells.ts";
-import { ELEVATIONS, takePictures, type TreePictures } from "./treePictures.ts";
+import { ELEVATIONS, renderImpostors, type TreeImpostors } from "./treeImpostors.ts";
 
-/** Trees far away: one draw call for all of them, each a picture of its model that faces the camera. */
+/** Trees far away: one draw call for all of them, each an impostor of its model that faces the camera. */
 export class DistantTrees {
   readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
   /** Of all models, foot to farthest point, m. */
   readonly tallest: number;
   private readonly spheres: Sphere[];
-  private readonly pictures: TreePictures;
+  private readonly impostors: TreeImpostors;
   private shown = -1;
 
   constructor(
@@ -39,8 +39,8 @@ export class DistantTrees {
       0,
       ...this.spheres.map(({ center, radius }) => center.length() + radius),
     );
-    this.pictures = takePictures(shapes, this.spheres, renderer);
-    const total = models.reduce((sum, { places }) => sum + places.length / 16, 0);
+    this.impostors = renderImpostors(shapes, this.spheres, renderer);
+    const total = models.reduce((sum, { transforms }) => sum + transforms.length / 16, 0);
     this.object = new Mesh(quads(total), this.material());
     this.object.frustumCulled = false;
   }
@@ -56,24 +56,29 @@ export class DistantTrees {
 
   plant(chosen: readonly Chosen[]): void {
     const { geometry } = this.object;
-    const place = geometry.getAttribute("place") as InstancedBufferAttribute;
+    const origin = geometry.getAttribute("origin") as InstancedBufferAttribute;
     const look = geometry.getAttribute("look") as InstancedBufferAttribute;
     let count = 0;
     chosen.forEach(({ distant }, model) => {
       const { center, radius } = this.spheres[model]!;
-      const { places } = this.models[model]!;
+      const { transforms } = this.models[model]!;
       for (const tree of distant) {
         const m = 16 * tree;
-        const wide = Math.hypot(places[m]!, places[m + 1]!, places[m + 2]!);
-        const tall = Math.hypot(places[m + 8]!, places[m + 9]!, places[m + 10]!);
-        place.setXYZ(count, places[m + 12]!, places[m + 13]!, places[m + 14]! + tall * center.z);
+        const wide = Math.hypot(transforms[m]!, transforms[m + 1]!, transforms[m + 2]!);
+        const tall = Math.hypot(transforms[m + 8]!, transforms[m + 9]!, transforms[m + 10]!);
+        origin.setXYZ(
+          count,
+          transforms[m + 12]!,
+          transforms[m + 13]!,
+          transforms[m + 14]! + tall * center.z,
+        );
         look.setXYZ(count, 2 * radius * wide, 2 * radius * tall, model);
         count++;
       }
     });
     geometry.instanceCount = count;
     this.object.visible = count > 0;
-    for (const attribute of [place, look]) {
+    for (const attribute of [origin, look]) {
       attribute.clearUpdateRanges();
       attribute.addUpdateRange(0, attribute.itemSize * count);
       attribute.needsUpdate = true;
@@ -83,7 +88,7 @@ export class DistantTrees {
   dispose(): void {
     this.object.geometry.dispose();
     this.object.material.dispose();
-    this.pictures.texture.dispose();
+    this.impostors.texture.dispose();
   }
 
   private material(): ShaderMaterial {
@@ -93,10 +98,10 @@ export class DistantTrees {
       { sun: vector(), above: vector(), below: vector(), towardsLight: vector() },
       {
         tiles: { value: new Vector2(this.models.length, ELEVATIONS.length) },
-        pictures: { value: null },
+        impostors: { value: null },
       },
     ]);
-    uniforms.pictures!.value = this.pictures.texture;
+    uniforms.impostors!.value = this.impostors.texture;
     return new ShaderMaterial({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
@@ -111,7 +116,7 @@ function quads(count: number): InstancedBufferGeometry {
   const corners = new Float32Array([-0.5, -0.5, 0, 0.5, -0.5, 0, 0.5, 0.5, 0, -0.5, 0.5, 0]);
   geometry.setAttribute("position", new BufferAttribute(corners, 3));
   geometry.setIndex([0, 1, 2, 0, 2, 3]);
-  for (const name of ["place", "look"]) {
+  for (const name of ["origin", "look"]) {
     const attribute = new InstancedBufferAttribute(new Float32Array(3 * count), 3);
     geometry.setAttribute(name, attribute.setUsage(DynamicDrawUsage));
   }
@@ -122,31 +127,32 @@ function quads(count: number): InstancedBufferGeometry {
 function around(geometries: readonly BufferGeometry[]): Sphere {
   const points: Vector3[] = [];
   for (const geometry of geometries) {
-    const place = geometry.getAttribute("position");
-    for (let i = 0; i < place.count; i++) points.push(new Vector3().fromBufferAttribute(place, i));
+    const position = geometry.getAttribute("position");
+    for (let i = 0; i < position.count; i++)
+      points.push(new Vector3().fromBufferAttribute(position, i));
   }
   let [low, high] = [Infinity, -Infinity];
   for (const { z } of points) [low, high] = [Math.min(low, z), Math.max(high, z)];
   const center = new Vector3(0, 0, points.length > 0 ? 0.5 * (low + high) : 0);
-  const radius = points.reduce((most, point) => Math.max(most, center.distanceTo(point)), 0);
+  const radius = points.reduce((max, point) => Math.max(max, center.distanceTo(point)), 0);
   return new Sphere(center, radius);
 }
 
 const VERTEX = /* glsl */ `
 #include <fog_pars_vertex>
-attribute vec3 place, look;
+attribute vec3 origin, look;
 uniform vec2 tiles;
 varying vec2 vLow, vHigh, vIn;
 varying float vBlend, vHue;
 varying vec3 vRight, vUp, vTowards;
 void main() {
-  vec3 towards = normalize(cameraPosition - place);
+  vec3 towards = normalize(cameraPosition - origin);
   vec3 right = normalize(cross(vec3(0.0, 0.0, 1.0), towards) + vec3(1e-5, 0.0, 0.0));
   vec3 up = cross(towards, right);
   // The taller tree is stretched along its trunk, however much of that is seen.
   float tall = mix(look.y, look.x, abs(towards.z));
-  vHue = fract(sin(dot(place.xy, vec2(12.9898, 78.233))) * 43758.5453);
-  vec3 world = place + right * position.x * look.x + up * position.y * tall;
+  vHue = fract(sin(dot(origin.xy, vec2(12.9898, 78.233))) * 43758.5453);
+  vec3 world = origin + right * position.x * look.x + up * position.y * tall;
   float row = clamp(asin(clamp(towards.z, 0.0, 1.0)) * ${(180 / Math.PI).toFixed(4)} / ${ELEVATIONS[1]!.toFixed(1)}, 0.0, tiles.y - 1.001);
   vec2 uv = position.xy + 0.5;
   if (vHue > 0.5) uv.x = 1.0 - uv.x;
@@ -164,13 +170,13 @@ void main() {
 const FRAGMENT = /* glsl */ `
 #include <common>
 #include <fog_pars_fragment>
-uniform sampler2D pictures;
+uniform sampler2D impostors;
 uniform vec3 sun, above, below, towardsLight;
 varying vec2 vLow, vHigh, vIn;
 varying float vBlend, vHue;
 varying vec3 vRight, vUp, vTowards;
 void main() {
-  vec4 tree = mix(texture2D(pictures, vLow), texture2D(pictures, vHigh), vBlend);
+  vec4 tree = mix(texture2D(impostors, vLow), texture2D(impostors, vHigh), vBlend);
   if (tree.a < 0.35) discard;
   vec3 colour = tree.rgb / tree.a;
   if (colour.g > colour.r) colour *= mix(vec3(1.0), vec3(1.35, 1.12, 0.75), 0.5 * vHue);

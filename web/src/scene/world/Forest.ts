@@ -8,13 +8,13 @@ import type { Model } from "./readWorld.ts";
 import { crownOf, withNormals } from "./shapes.ts";
 import { TreeCells, TURN_RAD, type Chosen } from "./treeCells.ts";
 
-/** Trees are chosen anew when the camera has moved so far, m. */
+/** Trees are chosen again when the camera has moved so far, m. */
 const MOVE_M = 3;
 
-/** Trees: whole ones near the camera, pictures of them beyond; few draw calls for thousands. */
+/** Trees: whole ones near the camera, impostors beyond; few draw calls for thousands. */
 export class Forest implements Part {
   readonly object = new Group();
-  /** Whether the trees around the camera were chosen anew: their shadows are others. */
+  /** Whether the trees around the camera were chosen again: their shadows are others. */
   changed = false;
 
   private readonly meshes: InstancedMesh[][];
@@ -22,8 +22,8 @@ export class Forest implements Part {
   private readonly cells: TreeCells;
   private readonly chosen: Chosen[];
   private readonly eye = new Vector3(Infinity, 0, 0);
-  private readonly way = new Vector3();
-  private readonly wayNow = new Vector3();
+  private readonly direction = new Vector3();
+  private readonly directionNow = new Vector3();
   private readonly frustum = new Frustum();
   private readonly matrix = new Matrix4();
   private wholeM = -1;
@@ -44,7 +44,7 @@ export class Forest implements Part {
     );
     this.meshes = shapes.map((parts, model) =>
       parts.map(({ geometry, material, colour, map }) => {
-        const count = models[model]!.places.length / 16;
+        const count = models[model]!.transforms.length / 16;
         const made = worldMaterial(material, colour, map, false);
         const mesh = new InstancedMesh(geometry, made, count);
         mesh.count = 0;
@@ -63,15 +63,15 @@ export class Forest implements Part {
   update(moment: Moment): void {
     this.distant.update();
     const { camera, quality } = moment;
-    camera.getWorldDirection(this.wayNow);
+    camera.getWorldDirection(this.directionNow);
     this.changed =
       camera.position.distanceTo(this.eye) > MOVE_M ||
-      this.wayNow.angleTo(this.way) > 0.8 * TURN_RAD ||
+      this.directionNow.angleTo(this.direction) > 0.8 * TURN_RAD ||
       quality.wholeTreesM !== this.wholeM ||
       camera.fov !== this.fov;
     if (!this.changed) return;
     this.eye.copy(camera.position);
-    this.way.copy(this.wayNow);
+    this.direction.copy(this.directionNow);
     this.wholeM = quality.wholeTreesM;
     this.fov = camera.fov;
     this.matrix.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
@@ -83,11 +83,11 @@ export class Forest implements Part {
 
   /** Put the meshes of a model where its chosen trees stand. */
   private plant(model: number, trees: readonly number[]): void {
-    const { places } = this.models[model]!;
+    const { transforms } = this.models[model]!;
     for (const mesh of this.meshes[model]!) {
       const { instanceMatrix } = mesh;
       trees.forEach((tree, i) => {
-        for (let k = 0; k < 16; k++) instanceMatrix.array[16 * i + k] = places[16 * tree + k]!;
+        for (let k = 0; k < 16; k++) instanceMatrix.array[16 * i + k] = transforms[16 * tree + k]!;
       });
       mesh.count = trees.length;
       mesh.visible = trees.length > 0;

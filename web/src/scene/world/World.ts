@@ -25,7 +25,7 @@ import { Obstacles } from "./obstacles.ts";
 /** Ground, trees and buildings, as the server has them; a grid where there is no world. */
 export class World implements Part {
   readonly object = new Group();
-  /** Whether what the page waits for is in the picture. */
+  /** Whether what the page waits for is in the scene. */
   ready = false;
   /** Grows when something stands elsewhere: shadows are others. */
   version = 0;
@@ -95,7 +95,9 @@ export class World implements Part {
     }
     const ground = content.solids.filter(({ material }) => isGround(material));
     this.grid.visible = content.solids.length === 0 && content.models.length === 0;
-    const surfaces = ground.map(({ geometry, place }) => geometry.clone().applyMatrix4(place));
+    const surfaces = ground.map(({ geometry, transform }) =>
+      geometry.clone().applyMatrix4(transform),
+    );
     setCurrentWorld(new Ground(surfaces), obstaclesOf(content, isGround));
     const own = ground.findIndex(({ material }) => material === "ground");
     if (own >= 0) this.surround(cornersOf([surfaces[own]!]), ground[own]!.colour);

@@ -8,12 +8,12 @@ const SQUARE = Float64Array.from(
 
 describe("the land around", () => {
   const land = landAround(SQUARE)!;
-  const place = land.getAttribute("position");
+  const position = land.getAttribute("position");
   const share = land.getAttribute("base");
 
   it("begins at the border at its height and ends far outside, level", () => {
-    for (let i = 0; i < place.count; i++) {
-      const [x, y, z] = [place.getX(i), place.getY(i), place.getZ(i)];
+    for (let i = 0; i < position.count; i++) {
+      const [x, y, z] = [position.getX(i), position.getY(i), position.getZ(i)];
       const outside = Math.max(-x, x - 100, -y, y - 100);
       if (share.getX(i) === 0) {
         expect(outside).toBeCloseTo(0, 9);

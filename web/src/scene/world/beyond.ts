@@ -1,4 +1,4 @@
-// The land around the world: only a backdrop, so that the picture has a horizon where the world ends.
+// The land around the world: only a backdrop, so that the scene has a horizon where the world ends.
 // It is paler than the world's own ground, and no sensor of the simulation sees it.
 
 import { BufferAttribute, BufferGeometry, type Color, Mesh, type Material } from "three";
@@ -96,7 +96,7 @@ function edgesOf(corners: Float64Array, box: Box): Edge[] {
   return edges;
 }
 
-/** A place of the border, moved away from the middle until that many metres outside the box. */
+/** A position on the border, moved away from the middle until that many metres outside the box. */
 function outwards(x: number, y: number, { left, right, bottom, top }: Box, away: number) {
   const [middleX, middleY] = [0.5 * (left + right), 0.5 * (bottom + top)];
   const [wide, deep] = [0.5 * (right - left), 0.5 * (top - bottom)];

@@ -2,7 +2,7 @@ import { ownEntry } from "../../lib/ownEntry.ts";
 
 // What surfaces look like close up, by the names of `volery.world.materials`. Each is a few lines of
 // shader that change what the glTF says: `colour` and `rough` may be set, `height` (m) makes relief,
-// `glow` is light of its own, `vanish` (0 to 1) how much of it is lost in the haze. At hand are `place` (map, m), `own` (m, in the thing's own axes),
+// `glow` is light of its own, `vanish` (0 to 1) how much of it is lost in the haze. At hand are `mapPosition` (m), `own` (m, in the shape's own axes),
 // `facing` (the surface's normal, map), `night` (0 to 1) and `noise(uv)`, see `noiseTexture.ts`.
 
 export interface Finish {
@@ -11,21 +11,21 @@ export interface Finish {
   shader: string;
   /** Moves in the wind. */
   sways?: boolean;
-  /** Made of leaves: lit from both sides, cut out by a picture of leaves. */
+  /** Made of leaves: lit from both sides, cut out by an image of leaves. */
   leafy?: boolean;
   /** Fades into the haze by itself, by `vanish`. */
   vanishes?: boolean;
 }
 
 const GROUND = /* glsl */ `
-  vec4 wide = noise(place.xy / 61.0), middle = noise(place.xy / 9.0 + wide.r), close = noise(place.xy / 1.7);
+  vec4 wide = noise(mapPosition.xy / 61.0), middle = noise(mapPosition.xy / 9.0 + wide.r), close = noise(mapPosition.xy / 1.7);
   float grass = smoothstep(0.3, 0.56, 0.5 * wide.r + 0.35 * middle.r + 0.15 * close.g);
   grass *= smoothstep(0.55, 0.8, facing.z);
   vec3 soil = colour * mix(vec3(0.75, 0.62, 0.6), vec3(1.5, 1.2, 1.1), close.g * 0.6 + middle.g * 0.4);
   vec3 blades = mix(vec3(0.055, 0.1, 0.024), vec3(0.16, 0.23, 0.06), close.g * 0.7 + middle.g * 0.3);
   blades = mix(blades, vec3(0.22, 0.21, 0.085), 0.5 * smoothstep(0.55, 0.9, middle.a));
   colour = mix(soil, blades, grass);
-  height = 0.05 * close.g + 0.02 * noise(place.xy / 0.41).g;
+  height = 0.05 * close.g + 0.02 * noise(mapPosition.xy / 0.41).g;
 `;
 
 /** As the ground, paler from the border on and gone into the haze where it ends. */
@@ -37,7 +37,7 @@ const BEYOND = `${GROUND}
 `;
 
 const COVER = /* glsl */ `
-  vec4 middle = noise(place.xy / 11.0), close = noise(place.xy / 1.3);
+  vec4 middle = noise(mapPosition.xy / 11.0), close = noise(mapPosition.xy / 1.3);
   float green = smoothstep(0.02, 0.1, colour.g - 0.5 * (colour.r + colour.b));
   colour *= mix(0.85 + 0.3 * close.g, 0.6 + 0.5 * close.g + 0.35 * middle.r, green);
   height = mix(0.004, 0.04, green) * close.g;
@@ -61,7 +61,7 @@ const LEAF = /* glsl */ `
 /** Panes in a lattice of storeys and bays as the cameras see them (`facade_kernels.py`), some lit at night. */
 const FACADE = /* glsl */ `
   vec2 level = normalize(facing.yx * vec2(-1.0, 1.0) + 1e-5);
-  vec2 wall = vec2(dot(place.xy, level) / 2.6, above / 3.1);
+  vec2 wall = vec2(dot(mapPosition.xy, level) / 2.6, above / 3.1);
   vec2 cell = floor(wall), blur = max(fwidth(wall), 1e-4);
   float steep = 1.0 - smoothstep(0.3, 0.6, abs(facing.z));
   bool shop = cell.y < 0.5;
@@ -81,36 +81,36 @@ const FACADE = /* glsl */ `
 `;
 
 const ROOF = /* glsl */ `
-  vec4 spots = noise(place.xy / 6.0), fine = noise(place.xy / 0.9);
+  vec4 spots = noise(mapPosition.xy / 6.0), fine = noise(mapPosition.xy / 0.9);
   colour *= 0.75 + 0.3 * spots.r + 0.2 * fine.g;
   height = 0.01 * fine.g;
 `;
 
 const PLASTER = /* glsl */ `
   vec3 side = abs(facing);
-  vec2 flat_ = side.z > 0.6 ? place.xy : vec2(place.x + place.y, place.z);
+  vec2 flat_ = side.z > 0.6 ? mapPosition.xy : vec2(mapPosition.x + mapPosition.y, mapPosition.z);
   vec4 spots = noise(flat_ / 5.0), fine = noise(flat_ / 0.8);
   colour *= 0.82 + 0.22 * spots.r + 0.14 * fine.g;
   height = 0.004 * fine.g;
 `;
 
 const ASPHALT = /* glsl */ `
-  vec4 spots = noise(place.xy / 7.0), fine = noise(place.xy / 0.5);
+  vec4 spots = noise(mapPosition.xy / 7.0), fine = noise(mapPosition.xy / 0.5);
   colour *= 0.7 + 0.3 * spots.r + 0.35 * fine.g;
   height = 0.003 * fine.g;
 `;
 
 const PAVING = /* glsl */ `
-  vec2 slab = fract(place.xy / 0.6), cell = floor(place.xy / 0.6);
-  float blur = clamp(length(fwidth(place.xy / 0.6)), 0.0, 1.0);
+  vec2 slab = fract(mapPosition.xy / 0.6), cell = floor(mapPosition.xy / 0.6);
+  float blur = clamp(length(fwidth(mapPosition.xy / 0.6)), 0.0, 1.0);
   float joint = min(min(slab.x, slab.y), min(1.0 - slab.x, 1.0 - slab.y));
   colour *= mix(mix(0.6, 1.0, smoothstep(0.01, 0.04, joint)), 0.95, blur);
   colour *= 0.85 + 0.3 * fract(sin(dot(cell, vec2(127.1, 311.7))) * 43758.5453) * (1.0 - blur);
-  colour *= 0.85 + 0.25 * noise(place.xy / 3.0).r;
+  colour *= 0.85 + 0.25 * noise(mapPosition.xy / 3.0).r;
 `;
 
 const GRAIN = /* glsl */ `
-  colour *= 0.9 + 0.2 * noise(vec2(place.x + place.y, place.z) / 1.5).r;
+  colour *= 0.9 + 0.2 * noise(vec2(mapPosition.x + mapPosition.y, mapPosition.z) / 1.5).r;
 `;
 
 const PLAIN_FINISH: Finish = { roughness: 0.85, shader: GRAIN };

@@ -30,7 +30,7 @@ export class Ground {
     for (let t = 0; t < this.corners.length; t += 9) this.sort(t);
   }
 
-  /** Highest ground at a place, m; beside the ground its lowest height. */
+  /** Highest ground at a position, m; beside the ground its lowest height. */
   heightAt(x: number, y: number): number {
     let height = -Infinity;
     for (const t of this.cells.get(this.cell(x, y)) ?? [])
@@ -64,7 +64,7 @@ export class Ground {
       }
   }
 
-  /** Height of triangle `t` at a place; -Infinity beside it. */
+  /** Height of triangle `t` at a position; -Infinity beside it. */
   private on(t: number, x: number, y: number): number {
     const c = this.corners;
     const [ax, ay, bx, by] = [c[t]!, c[t + 1]!, c[t + 3]!, c[t + 4]!];
@@ -82,11 +82,11 @@ export class Ground {
 export function cornersOf(geometries: readonly BufferGeometry[]): Float64Array {
   const corners: number[] = [];
   for (const geometry of geometries) {
-    const place = geometry.getAttribute("position");
-    const count = geometry.index?.count ?? place.count;
+    const position = geometry.getAttribute("position");
+    const count = geometry.index?.count ?? position.count;
     for (let i = 0; i < count; i++) {
       const at = geometry.index === null ? i : geometry.index.getX(i);
-      corners.push(place.getX(at), place.getY(at), place.getZ(at));
+      corners.push(position.getX(at), position.getY(at), position.getZ(at));
     }
   }
   return Float64Array.from(corners);

@@ -24,7 +24,7 @@ export const worldUniforms = {
 
 let plain = false;
 
-/** Once, before the first world: `software` for pictures that the processor draws. */
+/** Once, before the first world: `software` where the processor draws. */
 export function prepareMaterials(software: boolean): void {
   plain = software;
   worldUniforms.noiseMap.value ??= makeNoise(software ? 1 : 4);
@@ -88,34 +88,34 @@ const VANISH = /* glsl */ `
 const BASE = "attribute float base;\n";
 
 const VERTEX_HEAD = /* glsl */ `
-varying vec3 vPlace, vOwn, vFacing;
+varying vec3 vMapPosition, vOwn, vFacing;
 varying float vAbove, vBase, vHue;
 varying vec2 vLeaf;
 uniform float timeS;
 uniform vec2 windMap;
 `;
 
-/** As three's `project_vertex`, with the place in the map on the way. */
+/** As three's `project_vertex`, with the position in the map in between. */
 function vertexBody({ sways, leafy }: Finish): string {
   return /* glsl */ `
-  vec4 placed = vec4(transformed, 1.0);
+  vec4 mapPosition = vec4(transformed, 1.0);
   vec3 facing = normal;
   vec3 foot = vec3(0.0);
   #ifdef USE_INSTANCING
-    placed = instanceMatrix * placed;
+    mapPosition = instanceMatrix * mapPosition;
     facing = mat3(instanceMatrix) * facing;
     foot = (modelMatrix * instanceMatrix[3]).xyz;
   #endif
-  placed = modelMatrix * placed;
+  mapPosition = modelMatrix * mapPosition;
   vFacing = normalize(mat3(modelMatrix) * facing);
   vOwn = position;
   vBase = base;
-  vAbove = placed.z - base;
+  vAbove = mapPosition.z - base;
   vHue = fract(sin(dot(foot.xy, vec2(12.9898, 78.233))) * 43758.5453);
   ${sways ? SWAY : ""}
   ${leafy ? "vLeaf = uv;\n" + FLUTTER : ""}
-  vPlace = placed.xyz;
-  vec4 mvPosition = viewMatrix * placed;
+  vMapPosition = mapPosition.xyz;
+  vec4 mvPosition = viewMatrix * mapPosition;
   gl_Position = projectionMatrix * mvPosition;
   `;
 }
@@ -124,20 +124,20 @@ function vertexBody({ sways, leafy }: Finish): string {
 const SWAY = /* glsl */ `
   #ifdef USE_INSTANCING
     float speed = length(windMap);
-    float tall = placed.z - foot.z;
+    float tall = mapPosition.z - foot.z;
     float phase = dot(foot.xy, windMap) * 0.05 / max(speed, 0.5) - timeS * (0.5 + 0.05 * speed);
     float gust = 0.6 + 0.4 * sin(phase) + 0.25 * sin(2.7 * phase + 6.3 * vHue);
-    placed.xy += windMap * gust * tall * tall * 0.00022;
+    mapPosition.xy += windMap * gust * tall * tall * 0.00022;
   #endif
 `;
 
 const FLUTTER = /* glsl */ `
   float quick = timeS * (2.0 + 0.5 * speed) + dot(position, vec3(3.1, 2.3, 1.7)) + 20.0 * vHue;
-  placed.xyz += vec3(sin(quick), sin(1.3 * quick + 1.0), 0.6 * sin(1.7 * quick)) * min(0.012 * speed, 0.09);
+  mapPosition.xyz += vec3(sin(quick), sin(1.3 * quick + 1.0), 0.6 * sin(1.7 * quick)) * min(0.012 * speed, 0.09);
 `;
 
 const FRAGMENT_HEAD = /* glsl */ `
-varying vec3 vPlace, vOwn, vFacing;
+varying vec3 vMapPosition, vOwn, vFacing;
 varying float vAbove, vBase, vHue;
 varying vec2 vLeaf;
 uniform sampler2D noiseMap, leafMap;
@@ -147,7 +147,7 @@ vec4 noise(vec2 uv) { return texture2D(noiseMap, uv); }
 
 function fragmentBody({ roughness, shader, leafy }: Finish): string {
   return /* glsl */ `
-  vec3 place = vPlace, own = vOwn, facing = normalize(vFacing), colour = diffuseColor.rgb, glow = vec3(0.0);
+  vec3 mapPosition = vMapPosition, own = vOwn, facing = normalize(vFacing), colour = diffuseColor.rgb, glow = vec3(0.0);
   float above = vAbove, night = nightShare, height = 0.0, vanish = 0.0, treeHue = vHue, rough = ${roughness.toFixed(3)};
   ${leafy ? "vec4 leaves = texture2D(leafMap, vLeaf);\n  if (leaves.a < 0.4) discard;\n  colour *= leaves.rgb * 1.6;" : ""}
   { ${shader} }

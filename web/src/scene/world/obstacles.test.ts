@@ -7,7 +7,7 @@ import { PlaneGeometry } from "three";
 const BODY = 0.3;
 
 describe("obstacles", () => {
-  it("stop a walker who goes straight at a trunk", () => {
+  it("stop a walker that goes straight at a trunk", () => {
     const forest = new Obstacles();
     forest.addTrunk(5, 0, 0.4);
     let at: [number, number] = [0, 0];
@@ -41,7 +41,7 @@ describe("obstacles", () => {
     expect(x).toBeLessThan(8 - BODY + 1e-3);
   });
 
-  it("do not trap somebody who begins within one", () => {
+  it("do not trap a walker that begins within one", () => {
     const forest = new Obstacles();
     forest.addTrunk(0, 0, 0.5);
     const [x, y] = forest.walk([0, 0], [0, 0], BODY, 0.5, 1.7);
@@ -52,8 +52,8 @@ describe("obstacles", () => {
 describe("ground", () => {
   it("is as high as its triangles", () => {
     const slope = new PlaneGeometry(100, 100, 20, 20);
-    const place = slope.getAttribute("position");
-    for (let i = 0; i < place.count; i++) place.setZ(i, 0.1 * place.getX(i) + 3);
+    const position = slope.getAttribute("position");
+    for (let i = 0; i < position.count; i++) position.setZ(i, 0.1 * position.getX(i) + 3);
     const ground = new Ground([slope]);
     for (const [x, y] of [
       [0, 0],

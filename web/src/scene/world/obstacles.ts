@@ -38,8 +38,8 @@ export class Obstacles {
   }
 
   /**
-   * Where somebody of that radius ends who wants from one place to another; feet and head: the
-   * heights between which walls stop. Along what is in the way one slides.
+   * Returns where a walker of that radius ends that moves from one position towards another; feet
+   * and head: the heights between which walls stop. The walker slides along obstacles.
    */
   walk(
     from: readonly [number, number],
@@ -68,14 +68,14 @@ export class Obstacles {
   ): [number, number] {
     for (let round = 0; round < 3; round++) {
       let free = true;
-      const push = (px: number, py: number, reach: number) => {
+      const push = (px: number, py: number, clearance: number) => {
         const [dx, dy] = [x - px, y - py];
         const distance = Math.hypot(dx, dy);
-        if (distance >= reach - 1e-6) return;
+        if (distance >= clearance - 1e-6) return;
         free = false;
         const [ux, uy] = distance > 1e-9 ? [dx / distance, dy / distance] : [1, 0];
-        x = px + ux * reach;
-        y = py + uy * reach;
+        x = px + ux * clearance;
+        y = py + uy * clearance;
       };
       for (const trunk of around(this.trunks, x, y)) push(trunk.x, trunk.y, trunk.radius + radius);
       for (const wall of around(this.walls, x, y)) {
@@ -106,7 +106,7 @@ function put<T>(
     }
 }
 
-/** What is in the nine cells around a place. */
+/** What is in the nine cells around a position. */
 function* around<T>(cells: Map<string, T[]>, x: number, y: number): Generator<T> {
   const [i, j] = [Math.floor(x / CELL_M), Math.floor(y / CELL_M)];
   for (let dj = -1; dj <= 1; dj++)

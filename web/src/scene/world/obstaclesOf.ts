@@ -14,42 +14,42 @@ export function obstaclesOf(
 ): Obstacles {
   const obstacles = new Obstacles();
   for (const model of models) addTrunks(obstacles, model);
-  for (const { geometry, place, material } of solids) {
+  for (const { geometry, transform, material } of solids) {
     if (isGround(material)) continue;
-    obstacles.addWalls(cornersOf([geometry.clone().applyMatrix4(place)]));
+    obstacles.addWalls(cornersOf([geometry.clone().applyMatrix4(transform)]));
   }
   return obstacles;
 }
 
-function addTrunks(obstacles: Obstacles, { parts, places }: Model): void {
+function addTrunks(obstacles: Obstacles, { parts, transforms }: Model): void {
   const wood = parts.filter(({ material }) => material === "wood");
   const solid = wood.length > 0 ? wood : parts.filter(({ material }) => material !== "leaf");
   if (solid.length === 0) return;
   const corners = cornersOf(solid.map(({ geometry }) => geometry));
   if (wood.length === 0) {
-    addCopies(obstacles, corners, places);
+    addCopies(obstacles, corners, transforms);
     return;
   }
   const { x, y, radius } = footOf(corners);
   const foot = new Vector3();
-  const place = new Matrix4();
-  for (let at = 0; at < places.length; at += 16) {
-    place.fromArray(places, at);
-    foot.set(x, y, 0).applyMatrix4(place);
-    const scale = Math.hypot(places[at]!, places[at + 1]!, places[at + 2]!);
+  const transform = new Matrix4();
+  for (let at = 0; at < transforms.length; at += 16) {
+    transform.fromArray(transforms, at);
+    foot.set(x, y, 0).applyMatrix4(transform);
+    const scale = Math.hypot(transforms[at]!, transforms[at + 1]!, transforms[at + 2]!);
     obstacles.addTrunk(foot.x, foot.y, Math.max(SLIMMEST_M, radius * scale));
   }
 }
 
 /** Walls of a shape that is no tree, wherever it stands. */
-function addCopies(obstacles: Obstacles, corners: Float64Array, places: Float32Array): void {
+function addCopies(obstacles: Obstacles, corners: Float64Array, transforms: Float32Array): void {
   const point = new Vector3();
-  const place = new Matrix4();
+  const transform = new Matrix4();
   const moved = new Float64Array(corners.length);
-  for (let at = 0; at < places.length; at += 16) {
-    place.fromArray(places, at);
+  for (let at = 0; at < transforms.length; at += 16) {
+    transform.fromArray(transforms, at);
     for (let i = 0; i < corners.length; i += 3) {
-      point.fromArray(corners, i).applyMatrix4(place);
+      point.fromArray(corners, i).applyMatrix4(transform);
       point.toArray(moved, i);
     }
     obstacles.addWalls(moved);

@@ -18,17 +18,17 @@ export interface Surface {
   map: Texture | null;
 }
 
-/** A shape that stands in many places. */
+/** A shape that stands many times. */
 export interface Model {
   parts: Surface[];
-  /** Matrices, 16 numbers each, map from model. */
-  places: Float32Array;
+  /** 16 numbers each, map from model. */
+  transforms: Float32Array;
 }
 
 /** What stands once, where it is in the map. */
 export interface Solid extends Surface {
   name: string;
-  place: Matrix4;
+  transform: Matrix4;
 }
 
 export interface WorldContent {
@@ -41,32 +41,32 @@ const ENU_FROM_GLTF = new Matrix4().set(1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 
 
 /**
  * What a glTF holds, in the map's axes: instances (EXT_mesh_gpu_instancing) and nodes that share
- * their meshes become models with places; all else stays as it is.
+ * their meshes become models with transforms; all else stays as it is.
  */
 export function readWorld(root: Object3D): WorldContent {
   root.updateMatrixWorld(true);
-  const groups = new Map<string, { surfaces: Surface[]; name: string; places: Matrix4[] }>();
+  const groups = new Map<string, { surfaces: Surface[]; name: string; transforms: Matrix4[] }>();
   root.traverse((node) => {
     const meshes = meshesOf(node, root);
     if (meshes.length === 0) return;
     const key = meshes.map(({ geometry }) => geometry.uuid).join(" ");
     let group = groups.get(key);
     if (group === undefined) {
-      group = { surfaces: meshes.map(surfaceOf), name: node.name, places: [] };
+      group = { surfaces: meshes.map(surfaceOf), name: node.name, transforms: [] };
       groups.set(key, group);
     }
-    group.places.push(...placesOf(meshes[0]!));
+    group.transforms.push(...transformsOf(meshes[0]!));
   });
   const content: WorldContent = { solids: [], models: [] };
-  for (const { surfaces, name, places } of groups.values()) {
+  for (const { surfaces, name, transforms } of groups.values()) {
     const grows = surfaces.some(({ material }) => material === "wood" || material === "leaf");
-    if (places.length > 1 || grows) content.models.push(modelOf(surfaces, places));
+    if (transforms.length > 1 || grows) content.models.push(modelOf(surfaces, transforms));
     else
       for (const surface of surfaces)
         content.solids.push({
           ...surface,
           name,
-          place: ENU_FROM_GLTF.clone().multiply(places[0]!),
+          transform: ENU_FROM_GLTF.clone().multiply(transforms[0]!),
         });
   }
   return content;
@@ -89,12 +89,12 @@ function isBundle(node: Object3D | null, root: Object3D): boolean {
 
 const IDENTITY = new Matrix4();
 
-function placesOf(mesh: Mesh): Matrix4[] {
+function transformsOf(mesh: Mesh): Matrix4[] {
   if (!(mesh instanceof InstancedMesh)) return [mesh.matrixWorld.clone()];
   return Array.from({ length: mesh.count }, (_, i) => {
-    const place = new Matrix4();
-    mesh.getMatrixAt(i, place);
-    return place.premultiply(mesh.matrixWorld);
+    const transform = new Matrix4();
+    mesh.getMatrixAt(i, transform);
+    return transform.premultiply(mesh.matrixWorld);
   });
 }
 
@@ -109,13 +109,13 @@ function surfaceOf(mesh: Mesh): Surface {
   };
 }
 
-/** Models are turned to z up themselves, so that places only say where they stand. */
-function modelOf(surfaces: Surface[], places: Matrix4[]): Model {
+/** Models are turned to z up themselves, so that transforms only say where they stand. */
+function modelOf(surfaces: Surface[], transforms: Matrix4[]): Model {
   const back = ENU_FROM_GLTF.clone().invert();
-  const matrices = new Float32Array(16 * places.length);
-  const place = new Matrix4();
-  places.forEach((given, i) => {
-    place
+  const matrices = new Float32Array(16 * transforms.length);
+  const transform = new Matrix4();
+  transforms.forEach((given, i) => {
+    transform
       .multiplyMatrices(ENU_FROM_GLTF, given)
       .multiply(back)
       .toArray(matrices, 16 * i);
@@ -124,5 +124,5 @@ function modelOf(surfaces: Surface[], places: Matrix4[]): Model {
     ...surface,
     geometry: surface.geometry.clone().applyMatrix4(ENU_FROM_GLTF),
   }));
-  return { parts, places: matrices };
+  return { parts, transforms: matrices };
 }

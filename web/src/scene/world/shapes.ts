@@ -1,4 +1,4 @@
-// Geometry as the picture needs it, from geometry as the glTF has it.
+// Geometry as the scene needs it, from geometry as the glTF has it.
 
 import { BufferAttribute, BufferGeometry, type Color, type Matrix4, Vector3 } from "three";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
@@ -19,27 +19,27 @@ export function withNormals(geometry: BufferGeometry, rounded: boolean): BufferG
 }
 
 /**
- * A crown: each triangle a twig that is cut out by a picture of leaves, larger by as much as that
+ * A crown: each triangle a twig that is cut out by an image of leaves, larger by as much as that
  * takes away; normals lead away from the crown's middle, so that it is lit as one soft body.
  */
 export function crownOf(geometry: BufferGeometry): BufferGeometry {
   const loose = geometry.index === null ? geometry.clone() : geometry.toNonIndexed();
-  const place = loose.getAttribute("position");
+  const position = loose.getAttribute("position");
   loose.computeBoundingBox();
   const middle = loose.boundingBox!.getCenter(new Vector3());
   middle.z = loose.boundingBox!.min.z + 0.3 * (loose.boundingBox!.max.z - loose.boundingBox!.min.z);
-  const normals = new Float32Array(3 * place.count);
-  const uvs = new Float32Array(2 * place.count);
-  const random = randoms(place.count);
+  const normals = new Float32Array(3 * position.count);
+  const uvs = new Float32Array(2 * position.count);
+  const random = randoms(position.count);
   const corners = [new Vector3(), new Vector3(), new Vector3()];
   const centre = new Vector3();
-  for (let i = 0; i + 2 < place.count; i += 3) {
-    corners.forEach((corner, k) => corner.fromBufferAttribute(place, i + k));
+  for (let i = 0; i + 2 < position.count; i += 3) {
+    corners.forEach((corner, k) => corner.fromBufferAttribute(position, i + k));
     centre.copy(corners[0]!).add(corners[1]!).add(corners[2]!).divideScalar(3);
     const first = Math.floor(3 * random());
     corners.forEach((corner, k) => {
       corner.sub(centre).multiplyScalar(LEAF_GROWTH).add(centre);
-      place.setXYZ(i + k, corner.x, corner.y, corner.z);
+      position.setXYZ(i + k, corner.x, corner.y, corner.z);
       uvs.set(
         [
           [0, 0],
@@ -59,11 +59,11 @@ export function crownOf(geometry: BufferGeometry): BufferGeometry {
 
 /** Shapes as one, where they stand; each vertex has its colour and the height of its shape's foot. */
 export function merged(
-  pieces: readonly { geometry: BufferGeometry; place: Matrix4; colour: Color }[],
+  pieces: readonly { geometry: BufferGeometry; transform: Matrix4; colour: Color }[],
   rounded: boolean,
 ): BufferGeometry {
-  const ready = pieces.map(({ geometry, place, colour }) => {
-    const own = withNormals(geometry.clone().applyMatrix4(place), rounded);
+  const ready = pieces.map(({ geometry, transform, colour }) => {
+    const own = withNormals(geometry.clone().applyMatrix4(transform), rounded);
     own.computeBoundingBox();
     return { own, colour, base: own.boundingBox!.min.z };
   });

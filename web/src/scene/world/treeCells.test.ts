@@ -1,14 +1,16 @@
 import { Frustum, Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import type { Model } from "./readWorld.ts";
-import { placeOf, TreeCells, type Chosen } from "./treeCells.ts";
+import { positionOf, TreeCells, type Chosen } from "./treeCells.ts";
 
 /** 5,000 trees on a lattice of 7 m. */
 function forest(): Model {
-  const places = new Float32Array(16 * 5000);
+  const transforms = new Float32Array(16 * 5000);
   for (let i = 0; i < 5000; i++)
-    new Matrix4().makeTranslation(7 * (i % 71), 7 * Math.floor(i / 71), 0).toArray(places, 16 * i);
-  return { parts: [], places };
+    new Matrix4()
+      .makeTranslation(7 * (i % 71), 7 * Math.floor(i / 71), 0)
+      .toArray(transforms, 16 * i);
+  return { parts: [], transforms };
 }
 
 function choose(position: [number, number, number], towards: [number, number, number]) {
@@ -26,10 +28,10 @@ function choose(position: [number, number, number], towards: [number, number, nu
 }
 
 describe("trees that are drawn", () => {
-  it("are whole near the camera and pictures beyond", () => {
+  it("are whole near the camera and impostors beyond", () => {
     const { model, camera, chosen } = choose([250, 250, 3], [400, 250, 3]);
     const away = (tree: number) =>
-      new Vector3(...placeOf(model.places, tree)).distanceTo(camera.position);
+      new Vector3(...positionOf(model.transforms, tree)).distanceTo(camera.position);
     expect(chosen.whole.length).toBeGreaterThan(0);
     for (const tree of chosen.whole) expect(away(tree)).toBeLessThan(40);
     for (const tree of chosen.distant) expect(away(tree)).toBeGreaterThanOrEqual(40);
@@ -39,7 +41,7 @@ describe("trees that are drawn", () => {
     const { model, frustum, chosen } = choose([250, 250, 3], [400, 250, 3]);
     const drawn = new Set([...chosen.whole, ...chosen.distant]);
     for (let tree = 0; tree < 5000; tree++)
-      if (frustum.containsPoint(new Vector3(...placeOf(model.places, tree))))
+      if (frustum.containsPoint(new Vector3(...positionOf(model.transforms, tree))))
         expect(drawn.has(tree)).toBe(true);
     expect(drawn.size).toBeLessThan(3000);
   });

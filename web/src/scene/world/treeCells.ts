@@ -4,7 +4,7 @@ import type { Model } from "./readWorld.ts";
 const CELL_M = 32;
 /** Trees as close as this are kept beside the view too: their shadows fall into it, m. */
 const BEHIND_M = 30;
-/** The view may turn so far before trees are chosen anew, rad. */
+/** The view may turn so far before trees are chosen again, rad. */
 export const TURN_RAD = 0.07;
 
 interface Cell {
@@ -28,9 +28,9 @@ export class TreeCells {
     tallest: number,
   ) {
     const cells = new Map<string, Cell>();
-    models.forEach(({ places }, model) => {
-      for (let tree = 0; 16 * tree < places.length; tree++) {
-        const [x, y, z] = placeOf(places, tree);
+    models.forEach(({ transforms }, model) => {
+      for (let tree = 0; 16 * tree < transforms.length; tree++) {
+        const [x, y, z] = positionOf(transforms, tree);
         const key = `${Math.floor(x / CELL_M)} ${Math.floor(y / CELL_M)}`;
         const cell = cells.get(key) ?? { sphere: new Sphere(), trees: [] };
         cells.set(key, cell);
@@ -41,7 +41,7 @@ export class TreeCells {
     for (const { sphere, trees } of cells.values()) {
       sphere.center.divideScalar(trees.length);
       for (const [model, tree] of trees) {
-        const [x, y, z] = placeOf(models[model]!.places, tree);
+        const [x, y, z] = positionOf(models[model]!.transforms, tree);
         const distance = sphere.center.distanceTo(new Vector3(x, y, z));
         sphere.radius = Math.max(sphere.radius, distance + tallest);
       }
@@ -60,7 +60,7 @@ export class TreeCells {
       const close = away - sphere.radius < BEHIND_M;
       if (!close && !frustum.intersectsSphere(wide)) continue;
       for (const [model, tree] of trees) {
-        const [x, y, z] = placeOf(this.models[model]!.places, tree);
+        const [x, y, z] = positionOf(this.models[model]!.transforms, tree);
         const square = (x - eye.x) ** 2 + (y - eye.y) ** 2 + (z - eye.z) ** 2;
         const { whole, distant } = out[model]!;
         (square < wholeM * wholeM ? whole : distant).push(tree);
@@ -69,7 +69,7 @@ export class TreeCells {
   }
 }
 
-export function placeOf(places: Float32Array, tree: number): [number, number, number] {
+export function positionOf(transforms: Float32Array, tree: number): [number, number, number] {
   const at = 16 * tree + 12;
-  return [places[at]!, places[at + 1]!, places[at + 2]!];
+  return [transforms[at]!, transforms[at + 1]!, transforms[at + 2]!];
 }

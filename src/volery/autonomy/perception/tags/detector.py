@@ -27,7 +27,7 @@ class DetectedTag:
     """Number in the family."""
     corners_px: Array
     """(4, 2) columns and rows of the black border's corners: top left, top right, bottom right,
-    bottom left of the picture."""
+    bottom left of the image."""
 
     @property
     def side_px(self) -> float:

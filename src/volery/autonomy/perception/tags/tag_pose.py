@@ -1,7 +1,7 @@
 """Poses of tags from the corners of their images.
 
 Frame of a tag, FLU: the origin is in the centre, z points out of the face, x to the top of the
-picture and y to its left.
+image and y to its left.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from volery.autonomy.perception.tags.detector import DetectedTag, load_opencv
 from volery.core import rotations
 from volery.core.arrays import Array
 
-_PICTURE_FROM_TAG = rotations.from_rpy(0.0, 0.0, 0.5 * np.pi)
-"""Rotation from the tag's frame to OpenCV's frame of the picture: x right, y up."""
+_IMAGE_FROM_TAG = rotations.from_rpy(0.0, 0.0, 0.5 * np.pi)
+"""Rotation from the tag's frame to OpenCV's frame of the image: x right, y up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ def tag_pose(
         position = np.asarray(shifts[k], np.float64).ravel()
         if np.isfinite(position).all() and position[2] > 0.0:
             turn = rotations.exponential(np.asarray(turns[k], np.float64).ravel())
-            attitude = rotations.multiply(turn, _PICTURE_FROM_TAG)
+            attitude = rotations.multiply(turn, _IMAGE_FROM_TAG)
             return TagPose(position, attitude, float(np.ravel(errors[k])[0]))
     return None
 

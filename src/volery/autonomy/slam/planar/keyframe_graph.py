@@ -70,11 +70,11 @@ class PlanarKeyframeGraph(SavedAttributes):
         if self._closer is None or frame.travelled - self._tried_at < _TRY_EACH:
             return False
         newest, found = len(self.frames) - 1, None
-        reach = self._reach() if self.is_placed else _ANYWHERE
-        for row in self._near(newest, reach) if self.is_placed else self._anywhere(newest):
+        window = self._search_window() if self.is_placed else _ANYWHERE
+        for row in self._near(newest, window) if self.is_placed else self._anywhere(newest):
             self._tried_at = frame.travelled
             self.tried += 1
-            closure = self._closer.close(self.frames, self.poses, newest, row, reach)
+            closure = self._closer.close(self.frames, self.poses, newest, row, window)
             if closure is not None and (found is None or closure.fit.met > found.fit.met):
                 found = closure
         return found is not None and self._weigh(found)
@@ -121,16 +121,16 @@ class PlanarKeyframeGraph(SavedAttributes):
 
     # ---------------------------------------------------------------------------- loop closures
 
-    def _reach(self) -> Array:
+    def _search_window(self) -> Array:
         """Returns the max error (3,) of the newest keyframe's estimated pose."""
         sigmas = 3.0 * np.sqrt(np.diag(self.covariance))
         wide = max(float(sigmas[0]), float(sigmas[1]))
-        reach = np.array([wide, wide, float(sigmas[2])])
-        return np.asarray(np.clip(reach, _NARROWEST, _WIDEST))
+        window = np.array([wide, wide, float(sigmas[2])])
+        return np.asarray(np.clip(window, _NARROWEST, _WIDEST))
 
-    def _near(self, newest: int, reach: Array) -> Iterator[int]:
+    def _near(self, newest: int, window: Array) -> Iterator[int]:
         """Yields old keyframes that may be nearby, nearest first, spaced apart."""
-        here, apart = self.frames[newest], self._settings.closing.apart_m
+        here, apart = self.frames[newest], self._settings.loop_closure.apart_m
         last = newest
         while last > 0 and (
             self.frames[last - 1].session == here.session
@@ -140,14 +140,14 @@ class PlanarKeyframeGraph(SavedAttributes):
         if last == 0:
             return
         away = np.hypot(*(np.array(self.poses[:last]) - self.poses[newest])[:, :2].T)
-        wide = float(reach[0]) > 1.0
-        within = float(reach[0]) + 3.0
+        wide = float(window[0]) > 1.0
+        within = float(window[0]) + 3.0
         taken: list[int] = []
         for row in np.argsort(away, kind="stable"):
             if away[row] > within or len(taken) == (_TRIES if wide else 1):
                 return
-            places = [self.poses[k][:2] for k in taken]
-            if all(float(np.hypot(*(self.poses[row][:2] - p))) > _SPACED_M for p in places):
+            positions = [self.poses[k][:2] for k in taken]
+            if all(float(np.hypot(*(self.poses[row][:2] - p))) > _SPACED_M for p in positions):
                 taken.append(int(row))
                 yield int(row)
 
@@ -164,7 +164,7 @@ class PlanarKeyframeGraph(SavedAttributes):
 
     def _weigh(self, found: PlanarLoopClosure) -> bool:
         """Accepts a closure, at once or once a second one agrees with it."""
-        c, away = self._settings.closing, found.away
+        c, away = self._settings.loop_closure, found.away
         far = math.hypot(away[0], away[1]) > c.far_m or abs(float(away[2])) > c.far_rad
         if not far and self.is_placed:
             self._pending = None
@@ -182,15 +182,17 @@ class PlanarKeyframeGraph(SavedAttributes):
 
     def _agree(self, one: PlanarLoopClosure, other: PlanarLoopClosure) -> bool:
         """Returns whether two closures move the newest keyframes to the same pose."""
-        c, first, second = self._settings.closing, one.edge, other.edge
+        c, first, second = self._settings.loop_closure, one.edge, other.edge
         a, b = self.frames[first.to], self.frames[second.to]
-        if a.session != b.session or b.travelled - a.travelled > c.again_way_m:
+        if a.session != b.session or b.travelled - a.travelled > c.max_travelled_m:
             return False
-        told = compose(compose(self.poses[first.origin], first.measured), between(a.pose, b.pose))
-        left = between(told, compose(self.poses[second.origin], second.measured))
-        way = b.travelled - a.travelled
+        expected = compose(
+            compose(self.poses[first.origin], first.measured), between(a.pose, b.pose)
+        )
+        left = between(expected, compose(self.poses[second.origin], second.measured))
+        travelled = b.travelled - a.travelled
         return bool(
-            math.hypot(left[0], left[1]) < c.again_m + 0.03 * way
+            math.hypot(left[0], left[1]) < c.again_m + 0.03 * travelled
             and abs(float(left[2])) < c.again_rad
         )
 

@@ -1,4 +1,4 @@
-"""A planar submap, and the two ways to match a scan to it."""
+"""A planar submap, and the two methods to match a scan to it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.autonomy.slam.planar.search_kernels import search
 from volery.autonomy.slam.planar.settings import MatchingSettings
 from volery.core.arrays import Array
 
-_MOST_CELLS = 30_000
+_MAX_CELLS = 30_000
 _NOWHERE = np.array([0.0, 0.0, -1.0])
 
 
@@ -26,32 +26,32 @@ class ScanMatch(NamedTuple):
     """(3, 3) information of the scan alone on the pose."""
     met: float
     """Matched returns, weighted by how well they fit."""
-    share: float
+    fraction: float
     """Fraction of all returns."""
 
 
 class PlanarSubmap:
-    """Holds walls within `reach_m` of a centre.
+    """Holds walls within `half_width_m` of a centre.
 
     levels: of the search, whose largest squares are 2^(levels - 1) cells.
     """
 
-    def __init__(self, reach_m: float, levels: int, fitting: MatchingSettings) -> None:
-        n = 2 * math.ceil(reach_m / CELL_M)
+    def __init__(self, half_width_m: float, levels: int, fitting: MatchingSettings) -> None:
+        n = 2 * math.ceil(half_width_m / CELL_M)
         self._grid = np.full((n, n), -1, np.int32)
-        self._cells = np.zeros((_MOST_CELLS, 2), np.int32)
-        self._sums = np.zeros((_MOST_CELLS, 6))
-        self._shapes = np.zeros((_MOST_CELLS, 6))
+        self._cells = np.zeros((_MAX_CELLS, 2), np.int32)
+        self._sums = np.zeros((_MAX_CELLS, 6))
+        self._shapes = np.zeros((_MAX_CELLS, 6))
         self._fields = np.zeros((levels, n, n), np.uint8)
         self._corner = np.zeros(2)
         self._fitting = fitting
         self.count = 0
         """Number of occupied cells."""
 
-    def draw(self, points: Array, middle: Array, least: float = 1.0) -> None:
+    def draw(self, points: Array, middle: Array, min_count: float = 1.0) -> None:
         """Replaces the map by points (K, 2) around a pose.
 
-        least: returns of a cell from which it counts in searches.
+        min_count: returns of a cell from which it counts in searches.
         """
         n = len(self._grid)
         self._corner = (np.floor(middle[:2] / CELL_M) - n // 2) * CELL_M
@@ -59,7 +59,7 @@ class PlanarSubmap:
         self.count = int(
             build(points, self._corner, self._grid, self._cells, self._sums, self._shapes)
         )
-        blur(self._cells, self._sums, self.count, self._corner, least, self._fields[0])
+        blur(self._cells, self._sums, self.count, self._corner, min_count, self._fields[0])
         pool(self._fields)
 
     def fit(self, points: Array, start: Array, certainty: Array | None = None) -> ScanMatch:
@@ -80,25 +80,25 @@ class PlanarSubmap:
         self,
         points: Array,
         middle: Array,
-        reach: Array,
+        window: Array,
         *,
         slope: Array | None = None,
-        least: float = 0.0,
+        min_score: float = 0.0,
         shut: Array | None = None,
     ) -> tuple[Array, float]:
-        """Returns the pose of points (K, 2) within `middle` (3,) +- `reach` (3,) that scores best.
+        """Returns the pose of points (K, 2) within `middle` (3,) +- `window` (3,) that scores best.
 
         slope: (3,) reduction of the score for each unit squared away from the centre. shut: a
         position and a radius that are excluded. The score is the fraction of matched returns, 0 if
-        none is above `least`.
+        none is above `min_score`.
         """
         best = middle.copy()
         far = float(np.sqrt((points * points).sum(axis=1)).max()) if len(points) else 1.0
         step = CELL_M / max(min(far, 8.0), 1.0)
         none = np.zeros(3)
         score = search(
-            points, self._fields, self._corner, middle, reach, step,
-            none if slope is None else slope, least, _NOWHERE if shut is None else shut, best,
+            points, self._fields, self._corner, middle, window, step,
+            none if slope is None else slope, min_score, _NOWHERE if shut is None else shut, best,
         )  # fmt: skip
         best[2] = math.remainder(best[2], math.tau)
         return best, float(score)

@@ -17,14 +17,14 @@ from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 from volery.core.arrays import Array
 
 _LEVELS = 6
-_MOST_FRAMES, _MOST_QUERIES = 24, 12
+_MAX_FRAMES, _MAX_QUERIES = 24, 12
 _THIN, _FINE = 160, 600
 """Number of returns for the search, and for the fit."""
 _ALIKE, _OTHER_M = 0.93, 0.7
 """A second position at this distance that scores nearly as well makes both ambiguous."""
 _ANY_RAD = 3.0
 """Window from which tracking counts as lost: it is centred on the older keyframe."""
-_LEAST_INFORMATION = 400.0
+_MIN_INFORMATION = 400.0
 """1/m^2 of the position in the weaker direction: below it only the stronger one is constrained."""
 _MARGIN = np.array([0.3, 0.3, 0.1])
 """Amount by which a fit may exceed the window of the search."""
@@ -49,8 +49,8 @@ class PlanarLoopCloser:
 
     def __init__(self, settings: PlanarSettings) -> None:
         self._settings = settings
-        reach = settings.returns.reach_m + settings.closing.around_m
-        self._map = PlanarSubmap(min(reach, 40.0), _LEVELS, settings.fitting)
+        half_width_m = settings.returns.max_range_m + settings.loop_closure.around_m
+        self._map = PlanarSubmap(min(half_width_m, 40.0), _LEVELS, settings.fitting)
 
     def close(
         self,
@@ -58,45 +58,45 @@ class PlanarLoopCloser:
         poses: Sequence[Array],
         newest: int,
         older: int,
-        reach: Array,
+        window: Array,
     ) -> PlanarLoopClosure | None:
         """Returns the newest keyframe relative to an older one; None if they do not fit.
 
-        reach: (3,) max error of the newest one's estimated pose, m and rad.
+        window: (3,) max error of the newest one's estimated pose, m and rad.
         """
         known = self._around(frames, poses, newest, older)
         query = self._query(frames, newest)
-        if len(known) == 0 or len(query) < 2 * self._settings.closing.least_met:
+        if len(known) == 0 or len(query) < 2 * self._settings.loop_closure.min_matches:
             return None
         at = poses[older]
         drawn = np.concatenate([placed(frames[k].points, between(at, poses[k])) for k in known])
         self._map.draw(drawn, np.zeros(3))
-        lost = reach[2] >= _ANY_RAD
+        lost = window[2] >= _ANY_RAD
         hypothesis = np.zeros(3) if lost else between(at, poses[newest])
-        is_narrow = reach[0] < 0.35 and reach[2] < 0.1
-        start = hypothesis if is_narrow else self._found(query, hypothesis, reach)
+        is_narrow = window[0] < 0.35 and window[2] < 0.1
+        start = hypothesis if is_narrow else self._found(query, hypothesis, window)
         if start is None:
             return None
         fine = np.ascontiguousarray(query[:: max(len(query) // _FINE, 1)])
         found = self._map.fit(fine, start)
         away = between(hypothesis, found.pose)
-        if not self._is_believed(found, away, reach, frames[newest].usual):
+        if not self._is_believed(found, away, window, frames[newest].usual):
             return None
         information = self._information(found.information, float(found.pose[2]))
         edge = PlanarEdge(older, newest, found.pose, information, is_closure=True)
         return PlanarLoopClosure(edge, found, away)
 
-    def _found(self, query: Array, hypothesis: Array, reach: Array) -> Array | None:
+    def _found(self, query: Array, hypothesis: Array, window: Array) -> Array | None:
         """Returns the best pose in the window; None if no pose fits, or two do."""
         thin = np.ascontiguousarray(query[:: max(len(query) // _THIN, 1)])
-        slope = np.zeros(3) if reach[2] >= _ANY_RAD else 0.04 / reach**2
-        least = 0.45
-        pose, score = self._map.search(thin, hypothesis, reach, slope=slope, least=least)
+        slope = np.zeros(3) if window[2] >= _ANY_RAD else 0.04 / window**2
+        min_score = 0.45
+        pose, score = self._map.search(thin, hypothesis, window, slope=slope, min_score=min_score)
         if score <= 0.0:
             return None
         shut = np.array([pose[0], pose[1], _OTHER_M])
         other, second = self._map.search(
-            thin, hypothesis, reach, slope=slope, least=_ALIKE * score, shut=shut
+            thin, hypothesis, window, slope=slope, min_score=_ALIKE * score, shut=shut
         )
         if second > 0.0 and not self._is_along(thin, pose, other):
             return None
@@ -106,22 +106,22 @@ class PlanarLoopCloser:
         """Returns whether two poses differ only along the direction that the walls leave open."""
         found = self._map.fit(query, pose)
         values, axes = np.linalg.eigh(found.information[:2, :2])
-        if values[0] > _LEAST_INFORMATION:
+        if values[0] > _MIN_INFORMATION:
             return False
         across = abs(float(axes[:, 1] @ (other[:2] - pose[:2])))
         return across < 0.4 and abs(math.remainder(float(other[2] - pose[2]), math.tau)) < 0.1
 
-    def _is_believed(self, found: ScanMatch, away: Array, reach: Array, usual: float) -> bool:
-        c = self._settings.closing
-        share = min(max(c.share * usual, c.least_share), c.most_share)
+    def _is_believed(self, found: ScanMatch, away: Array, window: Array, usual: float) -> bool:
+        c = self._settings.loop_closure
+        fraction = min(max(c.fraction * usual, c.min_fraction), c.max_fraction)
         values = np.linalg.eigvalsh(found.information[:2, :2])
-        weak = values[0] < _LEAST_INFORMATION
-        wanted = share + (0.06 if reach[0] > 1.5 else 0.0) + (0.04 if weak else 0.0)
-        if found.share < wanted or found.met < c.least_met or values[1] < _LEAST_INFORMATION:
+        weak = values[0] < _MIN_INFORMATION
+        wanted = fraction + (0.06 if window[0] > 1.5 else 0.0) + (0.04 if weak else 0.0)
+        if found.fraction < wanted or found.met < c.min_matches or values[1] < _MIN_INFORMATION:
             return False
-        if weak and reach[0] > 3.0:
+        if weak and window[0] > 3.0:
             return False  # any corridor would match
-        return bool((np.abs(away) <= reach + _MARGIN).all())
+        return bool((np.abs(away) <= window + _MARGIN).all())
 
     def _information(self, information: Array, yaw: float) -> Array:
         """Returns a closure's information, in the axes of its measurement."""
@@ -134,7 +134,7 @@ class PlanarLoopCloser:
         self, frames: Sequence[PlanarTrackerState], poses: Sequence[Array], newest: int, older: int
     ) -> list[int]:
         """Returns the nearest old keyframes around the older one."""
-        c, here = self._settings.closing, frames[newest]
+        c, here = self._settings.loop_closure, frames[newest]
         away = {
             k: float(np.hypot(*(poses[k] - poses[older])[:2]))
             for k in range(newest)
@@ -145,14 +145,14 @@ class PlanarLoopCloser:
             )
         }
         near = sorted((k for k in away if away[k] < c.around_m), key=lambda k: away[k])
-        return near[:_MOST_FRAMES]
+        return near[:_MAX_FRAMES]
 
     def _query(self, frames: Sequence[PlanarTrackerState], newest: int) -> Array:
         """Returns the last keyframes' returns (K, 2), in the axes of the newest keyframe."""
         here, parts = frames[newest], []
-        for k in range(newest, max(newest - _MOST_QUERIES, -1), -1):
-            way = here.travelled - frames[k].travelled
-            if frames[k].session != here.session or way > self._settings.closing.query_m:
+        for k in range(newest, max(newest - _MAX_QUERIES, -1), -1):
+            travelled = here.travelled - frames[k].travelled
+            if frames[k].session != here.session or travelled > self._settings.loop_closure.query_m:
                 break
             step = between(here.pose, frames[k].pose)
             parts.append(placed(thinned(frames[k].points, 0.1, 200), step))

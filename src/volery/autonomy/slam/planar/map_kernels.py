@@ -28,7 +28,7 @@ positions relative to the scanner: taken for objects they would hold it in place
 """
 FULL = 100
 """Value of the field on a wall."""
-_LEAST = 5.0
+_MIN_RETURNS = 5.0
 """Min number of returns of a line."""
 _STRAIGHT, _VERY_STRAIGHT = 0.12, 0.04
 """Max variance across over that along, of a line in a window of three cells, and of five."""
@@ -51,21 +51,21 @@ def _take_in(sums: Array, x: float, y: float) -> None:
 def _join(total: Array, part: Array) -> None:
     both = total[COUNT] + part[COUNT]
     dx, dy = part[MX] - total[MX], part[MY] - total[MY]
-    share = total[COUNT] * part[COUNT] / both
-    total[CXX] += part[CXX] + share * dx * dx
-    total[CXY] += part[CXY] + share * dx * dy
-    total[CYY] += part[CYY] + share * dy * dy
+    weight = total[COUNT] * part[COUNT] / both
+    total[CXX] += part[CXX] + weight * dx * dx
+    total[CXY] += part[CXY] + weight * dx * dy
+    total[CYY] += part[CYY] + weight * dy * dy
     total[MX] += dx * part[COUNT] / both
     total[MY] += dy * part[COUNT] / both
     total[COUNT] = both
 
 
 @inner_kernel
-def _window(grid: Grid, sums: Array, i: int, j: int, reach: int, total: Array) -> None:
+def _window(grid: Grid, sums: Array, i: int, j: int, radius: int, total: Array) -> None:
     n = grid.shape[0]
     total[:] = 0.0
-    for a in range(max(i - reach, 0), min(i + reach + 1, n)):
-        for b in range(max(j - reach, 0), min(j + reach + 1, n)):
+    for a in range(max(i - radius, 0), min(i + radius + 1, n)):
+        for b in range(max(j - radius, 0), min(j + radius + 1, n)):
             if grid[a, b] >= 0:
                 _join(total, sums[grid[a, b]])
 
@@ -78,7 +78,7 @@ def _shape(total: Array, shape: Array, straight: float) -> bool:
     middle, half = 0.5 * (a + d), math.hypot(0.5 * (a - d), b)
     low, high = max(middle - half, 0.0), middle + half
     shape[RX], shape[RY] = total[MX], total[MY]
-    if n < _LEAST or high < _ALONG_M * _ALONG_M or low > straight * high:
+    if n < _MIN_RETURNS or high < _ALONG_M * _ALONG_M or low > straight * high:
         return False
     angle = 0.5 * math.atan2(2.0 * b, a - d) + 0.5 * math.pi
     shape[NX], shape[NY] = math.cos(angle), math.sin(angle)
@@ -92,7 +92,7 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
 
     `corner` (2,) m is that of the grid.
     """
-    n, count, most = grid.shape[0], 0, sums.shape[0]
+    n, count, max_cells = grid.shape[0], 0, sums.shape[0]
     grid[:] = -1
     for k in range(points.shape[0]):
         i = math.floor((points[k, 0] - corner[0]) / CELL_M)
@@ -100,7 +100,7 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
         if not (0 <= i < n and 0 <= j < n):
             continue
         if grid[i, j] < 0:
-            if count == most:
+            if count == max_cells:
                 continue
             grid[i, j] = count
             cells[count, 0], cells[count, 1] = i, j
@@ -111,10 +111,10 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
     for k in range(count):
         i, j = cells[k, 0], cells[k, 1]
         _window(grid, sums, i, j, 2, total)
-        sparse = total[COUNT] < 3.0 * _LEAST
+        sparse = total[COUNT] < 3.0 * _MIN_RETURNS
         if _shape(total, shapes[k], _STRAIGHT if sparse else _VERY_STRAIGHT):
             continue
-        is_known = total[COUNT] >= _LEAST
+        is_known = total[COUNT] >= _MIN_RETURNS
         _window(grid, sums, i, j, 1, total)
         if not _shape(total, shapes[k], _STRAIGHT):
             own = sums[k]
@@ -126,15 +126,17 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
 
 
 @kernel
-def blur(cells: Grid, sums: Array, count: int, corner: Array, least: float, field: Field) -> None:
+def blur(
+    cells: Grid, sums: Array, count: int, corner: Array, min_count: float, field: Field
+) -> None:
     """Fills `field` with the proximity to walls: `FULL` at a wall, falling as a normal density.
 
-    Cells with fewer than `least` returns do not count.
+    Cells with fewer than `min_count` returns do not count.
     """
     n = field.shape[0]
     field[:] = 0
     for k in range(count):
-        if sums[k, COUNT] < least:
+        if sums[k, COUNT] < min_count:
             continue
         for a in range(max(cells[k, 0] - 2, 0), min(cells[k, 0] + 3, n)):
             for b in range(max(cells[k, 1] - 2, 0), min(cells[k, 1] + 3, n)):

@@ -16,7 +16,7 @@ from volery.autonomy.slam.planar.settings import MotionSettings
 from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
 
-_LEAST_M, _LEAST_RAD = 1e-3, 3e-4
+_MIN_M, _MIN_RAD = 1e-3, 3e-4
 """Min standard deviations of a prediction."""
 _FIRST_M_S, _FIRST_RAD_S = 1.0, 1.0
 _LONGEST_S = 3.0
@@ -53,9 +53,9 @@ class PlanarMotion(SavedAttributes):
 
     def _by_odometry(self, dt: float, step: Array) -> Array:
         s = self._settings
-        way, turn = math.hypot(step[0], step[1]), abs(float(step[2]))
-        along = s.odometry_m + s.odometry_per_m * way
-        yaw = s.odometry_rad + s.odometry_rad_per_m * way + s.odometry_rad_per_rad * turn
+        distance, turn = math.hypot(step[0], step[1]), abs(float(step[2]))
+        along = s.odometry_m + s.odometry_per_m * distance
+        yaw = s.odometry_rad + s.odometry_rad_per_m * distance + s.odometry_rad_per_rad * turn
         added = np.diag([along**2, along**2, yaw**2])
         before = float(self.pose[2])
         lever = self._lever(step)
@@ -106,15 +106,15 @@ class PlanarMotion(SavedAttributes):
     @property
     def certainty(self) -> Array:
         """Information (3, 3) on the pose."""
-        least = np.diag([_LEAST_M**2, _LEAST_M**2, _LEAST_RAD**2])
-        return np.asarray(np.linalg.inv(self.covariance[:3, :3] + least))
+        minimum = np.diag([_MIN_M**2, _MIN_M**2, _MIN_RAD**2])
+        return np.asarray(np.linalg.inv(self.covariance[:3, :3] + minimum))
 
     def correct(self, pose: Array, information: Array) -> None:
         """Sets the pose (3,) that scan and motion together make most likely.
 
         information: (3, 3) of the scan alone.
         """
-        own = self.covariance[:3, :3] + np.diag([_LEAST_M**2, _LEAST_M**2, _LEAST_RAD**2])
+        own = self.covariance[:3, :3] + np.diag([_MIN_M**2, _MIN_M**2, _MIN_RAD**2])
         after = np.linalg.inv(np.linalg.inv(own) + information)
         away = pose - self.pose
         away[2] = math.remainder(float(away[2]), math.tau)

@@ -17,7 +17,7 @@ from volery.graph.messages import Odometry, stamp_of
 _KEPT = 512
 _JUMP_BACK_NS = NS_PER_S // 2
 _LATE_NS, _GAP_NS = NS_PER_S // 4, 5 * NS_PER_S
-_MOST_M_S, _MOST_RAD_S = 20.0, 20.0
+_MAX_M_S, _MAX_RAD_S = 20.0, 20.0
 """Speeds above which a step is a reset of the odometry."""
 
 
@@ -73,7 +73,7 @@ def step_between(one: Array | None, other: Array | None, dt: float) -> Array | N
     if one is None or other is None:
         return None
     step = between(one, other)
-    most = max(dt, 0.02)
-    if math.hypot(step[0], step[1]) > _MOST_M_S * most or abs(step[2]) > _MOST_RAD_S * most:
+    max_s = max(dt, 0.02)
+    if math.hypot(step[0], step[1]) > _MAX_M_S * max_s or abs(step[2]) > _MAX_RAD_S * max_s:
         return None
     return step

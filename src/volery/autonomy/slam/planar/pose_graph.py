@@ -14,7 +14,7 @@ from volery.core.arrays import Array
 _ROUNDS = 20
 _BEND = 3.0
 """Standard deviations at which a closure begins to lose weight (Cauchy's kernel)."""
-_MOST_SIGMAS = 7.0
+_MAX_SIGMAS = 7.0
 """Max deviation of a closure after the optimization, in standard deviations; else it is removed."""
 
 
@@ -33,7 +33,7 @@ class PlanarEdge(NamedTuple):
 def optimised(poses: list[Array], edges: list[PlanarEdge]) -> tuple[list[Array], list[PlanarEdge]]:
     """Returns the optimized poses (3,), first one fixed, and the edges without outliers."""
     found = _solved(poses, edges)
-    kept = [edge for edge in edges if not edge.is_closure or _misfit(found, edge) <= _MOST_SIGMAS]
+    kept = [edge for edge in edges if not edge.is_closure or _misfit(found, edge) <= _MAX_SIGMAS]
     if len(kept) < len(edges):
         found = _solved(poses, kept)
     return found, kept

@@ -22,8 +22,8 @@ def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings
     """
     ranges = np.asarray(scan.ranges, np.float64)
     nearest = max(kept.nearest_m, float(scan.range_min))
-    farthest = min(kept.reach_m, 0.99 * float(scan.range_max) or math.inf)
-    rows = np.flatnonzero((ranges >= nearest) & (ranges <= farthest))
+    max_range_m = min(kept.max_range_m, 0.99 * float(scan.range_max) or math.inf)
+    rows = np.flatnonzero((ranges >= nearest) & (ranges <= max_range_m))
     if len(rows) == 0:
         return np.zeros((0, 2))
     angle = float(scan.angle_min) + rows * float(scan.angle_increment)
@@ -43,13 +43,13 @@ def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings
     return points
 
 
-def thinned(points: Array, apart: float, most: int) -> Array:
-    """Returns at most `most` of points (K, 2), in beam order, at least `apart` m apart."""
+def thinned(points: Array, apart: float, max_points: int) -> Array:
+    """Returns at most `max_points` of points (K, 2), in beam order, at least `apart` m apart."""
     kept = np.zeros(len(points), np.bool_)
     _thin(points, apart, kept)
     chosen = points[kept]
-    if len(chosen) > most:
-        chosen = chosen[np.linspace(0, len(chosen) - 1, most).round().astype(np.int64)]
+    if len(chosen) > max_points:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, max_points).round().astype(np.int64)]
     return np.ascontiguousarray(chosen)
 
 

@@ -18,7 +18,7 @@ from volery.core.compiled import inner_kernel, kernel
 
 Cells = NDArray[np.int32]
 
-_MOST_NODES = 400_000
+_MAX_NODES = 400_000
 """Max number of squares, which bounds the time."""
 
 
@@ -86,21 +86,21 @@ def search(
     fields: Field,
     corner: Array,
     middle: Array,
-    reach: Array,
+    window: Array,
     step_rad: float,
     slope: Array,
-    least: float,
+    min_score: float,
     shut: Array,
     best: Array,
 ) -> float:
-    """Finds the pose (3,) of points (K, 2) that scores best in `middle` (3,) +- `reach` (3,).
+    """Finds the pose (3,) of points (K, 2) that scores best in `middle` (3,) +- `window` (3,).
 
-    slope: (3,) reduction of the score for each unit squared away from `middle`. least: lower scores
-    are ignored. shut: (3,) position x, y and a radius that are excluded. Returns the score, 0 if
-    none was found; else `best` is filled.
+    slope: (3,) reduction of the score for each unit squared away from `middle`. min_score: lower
+    scores are ignored. shut: (3,) position x, y and a radius that are excluded. Returns the score,
+    0 if none was found; else `best` is filled.
     """
-    turns = math.ceil(reach[2] / step_rad)
-    wide, high = math.ceil(reach[0] / CELL_M), math.ceil(reach[1] / CELL_M)
+    turns = math.ceil(window[2] / step_rad)
+    wide, high = math.ceil(window[0] / CELL_M), math.ceil(window[1] / CELL_M)
     cells = np.empty((2 * turns + 1, points.shape[0], 2), np.int32)
     for t in range(2 * turns + 1):
         _turn(points, middle[2] + (t - turns) * step_rad, middle, corner, cells[t])
@@ -111,9 +111,9 @@ def search(
     count = (2 * turns + 1) * ((2 * wide) // side + 1) * ((2 * high) // side + 1)
     first, stack = np.empty((count, 5)), np.empty((4 * top + 8, 5))
     _begin(fields, cells, top, wide, high, first)
-    found, looked = least, 0
+    found, looked = min_score, 0
     for k in np.argsort(-first[:, 0]):
-        if first[k, 0] <= found or looked > _MOST_NODES:
+        if first[k, 0] <= found or looked > _MAX_NODES:
             break
         for n in range(5):
             stack[0, n] = first[k, n]
@@ -133,4 +133,4 @@ def search(
             if score > found and away >= shut[2] and abs(i) <= wide and abs(j) <= high:
                 found = score
                 best[0], best[1], best[2] = middle[0] + x, middle[1] + y, middle[2] + yaw
-    return found if found > least else 0.0
+    return found if found > min_score else 0.0

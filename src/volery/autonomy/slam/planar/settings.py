@@ -10,12 +10,12 @@ class ReturnSettings:
     """Selection of a scan's returns."""
 
     nearest_m: float = 0.05
-    reach_m: float = 30.0
+    max_range_m: float = 30.0
     apart_m: float = 0.04
     """Neighbouring returns nearer to each other than this are redundant."""
-    most: int = 360
+    max_points: int = 360
     """Max number of returns of a scan that are matched."""
-    most_kept: int = 720
+    max_keyframe_points: int = 720
     """Max number of returns of a keyframe."""
 
 
@@ -65,13 +65,13 @@ class KeyframeSettings:
 
     step_m: float = 0.5
     step_rad: float = 0.35
-    step_share: float = 0.75
+    step_fraction: float = 0.75
     """Matched fraction, relative to that after the last keyframe, below which a keyframe is due."""
-    least_m: float = 0.1
-    least_rad: float = 0.1
-    local_way: float = 10.0
+    min_m: float = 0.1
+    min_rad: float = 0.1
+    max_local_travelled: float = 10.0
     """Distance, m, that the local map covers; a rotation by 1 rad counts as 0.3 m."""
-    local_most: int = 60
+    max_local_keyframes: int = 60
 
 
 @dataclass(frozen=True)
@@ -84,18 +84,18 @@ class LoopClosureSettings:
     """Radius within which old keyframes are matched together."""
     query_m: float = 4.0
     """Distance travelled whose keyframes are matched with them."""
-    share: float = 0.85
+    fraction: float = 0.85
     """Min matched fraction, relative to the usual one."""
-    least_share: float = 0.42
-    most_share: float = 0.62
-    least_met: float = 40.0
+    min_fraction: float = 0.42
+    max_fraction: float = 0.62
+    min_matches: float = 40.0
     far_m: float = 0.5
     far_rad: float = 0.06
     """A closure that moves the keyframe farther needs confirmation by a second one."""
     again_m: float = 0.15
     again_rad: float = 0.03
     """Max difference of two closures, and max distance travelled between them."""
-    again_way_m: float = 8.0
+    max_travelled_m: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -106,4 +106,4 @@ class PlanarSettings:
     fitting: MatchingSettings = MatchingSettings()
     moving: MotionSettings = MotionSettings()
     keeping: KeyframeSettings = KeyframeSettings()
-    closing: LoopClosureSettings = LoopClosureSettings()
+    loop_closure: LoopClosureSettings = LoopClosureSettings()

@@ -27,7 +27,7 @@ _TURN_M = 0.3
 """Distance that a rotation by 1 rad counts as."""
 _FEW = 12
 """Returns below which a scan is ignored."""
-_POOR, _LOST_SHARE = 0.9, 0.5
+_POOR, _LOST_FRACTION = 0.9, 0.5
 """Fractions of the usual matched fraction below which a fit is doubtful, or rejected."""
 _USUAL_S = 5.0
 _LOST_SCANS, _LOST_NS = 4, NS_PER_S
@@ -66,7 +66,7 @@ class PlanarTracker(SavedAttributes):
         self.motion = PlanarMotion(settings.moving)
         self.time_ns: int | None = None
         self.travelled = self.travelled_m = 0.0
-        self.share = self.usual = 0.0
+        self.fraction = self.usual = 0.0
         self.session = 0
         self.misfits = 0
         """Number of consecutive scans that did not fit."""
@@ -74,17 +74,17 @@ class PlanarTracker(SavedAttributes):
         """Whether too few returns are in range, or scans leave a direction unconstrained."""
         self._misfit_ns = 0
         self._has_odometry = False
-        self._map = PlanarSubmap(settings.returns.reach_m + 4.0, _LEVELS, settings.fitting)
+        self._map = PlanarSubmap(settings.returns.max_range_m + 4.0, _LEVELS, settings.fitting)
         self._local: deque[PlanarTrackerState] = deque()
         self._last: PlanarTrackerState | None = None
         self._since = np.zeros((3, 3))
         """Covariance of the pose relative to the newest keyframe, in that one's axes."""
-        self._fresh_share = 0.0
+        self._fresh_fraction = 0.0
 
     PARTS = ("motion",)
     STATE = (
-        "time_ns", "travelled", "travelled_m", "share", "usual", "session", "misfits", "is_blind",
-        "is_open", "_misfit_ns", "_has_odometry", "_last", "_since", "_fresh_share",
+        "time_ns", "travelled", "travelled_m", "fraction", "usual", "session", "misfits",
+        "is_blind", "is_open", "_misfit_ns", "_has_odometry", "_last", "_since", "_fresh_fraction",
         "_local",
     )  # fmt: skip
 
@@ -131,7 +131,7 @@ class PlanarTracker(SavedAttributes):
         before = self.motion.pose.copy()
         added = self.motion.move(dt, step)
         self._has_odometry = step is not None
-        points = thinned(returns, r.apart_m, r.most)
+        points = thinned(returns, r.apart_m, r.max_points)
         found = None
         self.is_blind = len(points) < _FEW
         if len(points) >= _FEW and self._local:
@@ -142,7 +142,7 @@ class PlanarTracker(SavedAttributes):
             if self.misfits == 0:
                 self.is_open = is_open(found.information)
                 self.motion.correct(found.pose, found.information)
-        self._count_way(before, added, found)
+        self._update_covariance(before, added, found)
         is_first = len(points) >= _FEW and not self._local
         return self._keep(time_ns, returns) if is_first or self._is_due(found) else None
 
@@ -152,19 +152,19 @@ class PlanarTracker(SavedAttributes):
         """Matches by least squares from the prediction; if that fits poorly, after a search."""
         motion = self.motion
         found = self._map.fit(points, motion.pose, motion.certainty)
-        if found.share >= _POOR * self.usual and not self._is_surprising(found):
+        if found.fraction >= _POOR * self.usual and not self._is_surprising(found):
             return found
         sigma = np.sqrt(np.diag(motion.covariance)[:3])
-        reach = np.minimum(3.0 * sigma + [0.1, 0.1, 0.05], _WIDEST)
+        window = np.minimum(3.0 * sigma + [0.1, 0.1, 0.05], _WIDEST)
         if self.misfits:
-            reach = _WIDEST
-        slope = 0.02 / np.maximum(reach, 0.05) ** 2
+            window = _WIDEST
+        slope = 0.02 / np.maximum(window, 0.05) ** 2
         thin = np.ascontiguousarray(points[:: max(len(points) // 120, 1)])
-        start, score = self._map.search(thin, motion.pose, reach, slope=slope)
+        start, score = self._map.search(thin, motion.pose, window, slope=slope)
         if score <= 0.0:
             return found
         other = self._map.fit(points, start)
-        return other if other.share > found.share + 0.03 else found
+        return other if other.fraction > found.fraction + 0.03 else found
 
     def _is_surprising(self, found: ScanMatch) -> bool:
         """Returns whether the scan deviates from the prediction by more than four sigma."""
@@ -173,17 +173,17 @@ class PlanarTracker(SavedAttributes):
         return float(away @ self.motion.certainty @ away) > 16.0
 
     def _judge(self, time_ns: int, dt: float, found: ScanMatch) -> None:
-        self.share = found.share
-        if self.share >= _LOST_SHARE * self.usual:
+        self.fraction = found.fraction
+        if self.fraction >= _LOST_FRACTION * self.usual:
             self.misfits = 0
             passed = min(max(dt, 0.05) / _USUAL_S, 0.2)
-            self.usual += (passed if self.usual else 1.0) * (self.share - self.usual)
+            self.usual += (passed if self.usual else 1.0) * (self.fraction - self.usual)
             return
         self.misfits += 1
         if self.misfits == 1:
             self._misfit_ns = time_ns
 
-    def _count_way(self, before: Array, added: Array, found: ScanMatch | None) -> None:
+    def _update_covariance(self, before: Array, added: Array, found: ScanMatch | None) -> None:
         moved = between(before, self.motion.pose)
         self.travelled_m += math.hypot(moved[0], moved[1])
         self.travelled += math.hypot(moved[0], moved[1]) + _TURN_M * abs(float(moved[2]))
@@ -199,8 +199,10 @@ class PlanarTracker(SavedAttributes):
             yaw = float(self._last.pose[2])
             c, s = math.cos(yaw), math.sin(yaw)
             axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-            told = axes @ found.information @ axes.T
-            self._since = np.linalg.inv(np.linalg.inv(self._since + 1e-12 * np.eye(3)) + told)
+            information = axes @ found.information @ axes.T
+            self._since = np.linalg.inv(
+                np.linalg.inv(self._since + 1e-12 * np.eye(3)) + information
+            )
 
     # --------------------------------------------------------------------------------- keyframes
 
@@ -208,15 +210,15 @@ class PlanarTracker(SavedAttributes):
         if found is None or self.misfits or self._last is None:
             return False
         k = self.settings.keeping
-        if self._fresh_share == 0.0:
-            self._fresh_share = self.share
+        if self._fresh_fraction == 0.0:
+            self._fresh_fraction = self.fraction
         moved = between(self._last.pose, self.motion.pose)
-        way, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
-        stale = self.share < k.step_share * self._fresh_share
+        distance, turn = math.hypot(moved[0], moved[1]), abs(float(moved[2]))
+        stale = self.fraction < k.step_fraction * self._fresh_fraction
         return (
-            way > k.step_m
+            distance > k.step_m
             or turn > k.step_rad
-            or (stale and (way > k.least_m or turn > k.least_rad))
+            or (stale and (distance > k.min_m or turn > k.min_rad))
         )
 
     def _keep(self, time_ns: int, returns: Array) -> PlanarTrackerState:
@@ -225,19 +227,20 @@ class PlanarTracker(SavedAttributes):
         if self._last is not None:
             step = between(self._last.pose, pose)
             covariance = self._since + _FLOOR
-        points = thinned(returns, r.apart_m, r.most_kept)
+        points = thinned(returns, r.apart_m, r.max_keyframe_points)
         kept = PlanarTrackerState(
             time_ns, pose, points, step, covariance, self.travelled, self.usual, self.session
         )
         self._last = kept
         self._local.append(kept)
         k = self.settings.keeping
-        while len(self._local) > k.local_most or (
-            self.travelled - self._local[0].travelled > k.local_way and len(self._local) > 3
+        while len(self._local) > k.max_local_keyframes or (
+            self.travelled - self._local[0].travelled > k.max_local_travelled
+            and len(self._local) > 3
         ):
             self._local.popleft()
         self._since = np.zeros((3, 3))
-        self._fresh_share = 0.0
+        self._fresh_fraction = 0.0
         self._redraw()
         return kept
 

@@ -36,7 +36,7 @@ class DdsEndpoint(NamedTuple):
 class Discovery:
     """Tracks the endpoints of others."""
 
-    def __init__(self, participant: DomainParticipant, ear: ReaderThread) -> None:
+    def __init__(self, participant: DomainParticipant, reader_thread: ReaderThread) -> None:
         self._own = participant.guid.bytes
         self._lock = threading.Lock()
         self._writers: dict[bytes, DdsEndpoint] = {}
@@ -49,7 +49,7 @@ class Discovery:
         ):
             source = announcements(participant, topic)
             self._sources.append(source)
-            ear.listen(source, self._taker(known))
+            reader_thread.listen(source, self._taker(known))
 
     def when_changed(self, callback: Callable[[], None]) -> None:
         """Calls `callback` when others appear or leave."""

@@ -18,7 +18,7 @@ from volery.core.errors import BridgeError
 
 _ENCLAVE = b"enclave=/;"
 """Security enclave of the participant, in the form of rmw."""
-_MOST_PARTICIPANTS = 32
+_MAX_PARTICIPANTS = 32
 """Participants on one machine without multicast, for which rmw_cyclonedds probes with LOCALHOST
 discovery."""
 _RECEIVE_BUFFER = "4 MiB"
@@ -47,7 +47,7 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         how = "<AllowMulticast>false</AllowMulticast>"
         peers = (
             "<ParticipantIndex>auto</ParticipantIndex>"
-            f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}</MaxAutoParticipantIndex>"
+            f"<MaxAutoParticipantIndex>{_MAX_PARTICIPANTS}</MaxAutoParticipantIndex>"
             '<Peers><Peer address="localhost"/></Peers>'
         )
     lease = f"<LeaseDuration>{lease_s:g} s</LeaseDuration>"
@@ -99,7 +99,7 @@ def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
                 library.delete(domain)
             raise BridgeError(
                 f"cannot join DDS domain {domain_id}: {error}. Do the interfaces exist, and do "
-                f"fewer than {_MOST_PARTICIPANTS} other programs of this machine use it?"
+                f"fewer than {_MAX_PARTICIPANTS} other programs of this machine use it?"
             ) from None
         if not interfaces:
             confine(domain_id)

@@ -40,23 +40,23 @@ _HEADER = struct.Struct("<Qq")
 _CDR_HEADER = 4
 _LONGEST_WAIT_S = 0.1
 _PAUSE_S = 0.001
-_MOST_WAITING = 1000
+_MAX_WAITING = 1000
 """Open requests of one client; beyond, the oldest fails."""
 
 
-class DdsTopicName(NamedTuple):
+class DdsContext(NamedTuple):
     """Context of endpoints: the participant, its reader thread and its record."""
 
     participant: DomainParticipant
-    ear: ReaderThread
+    reader_thread: ReaderThread
     record: DiscoveryInfo
 
 
 class _Endpoint:
     """An endpoint, whose entities are created and deleted together."""
 
-    def __init__(self, place: DdsTopicName, node: NodeName) -> None:
-        self._place = place
+    def __init__(self, context: DdsContext, node: NodeName) -> None:
+        self._context = context
         self._node = node
         self._entities: list[tuple[Any, bool]] = []
         self._topics: list[Any] = []
@@ -64,36 +64,36 @@ class _Endpoint:
 
     def _add_writer(self, topic: Topic, qos: Any) -> Any:
         """Adds a writer of the node."""
-        return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
+        return self._add(topic, DataWriter(self._context.participant, topic, qos=qos), writes=True)
 
     def _add_reader(self, topic: Topic, qos: Any, take: Callable[[bytes, int], None]) -> Any:
         """Adds a reader of the node.
 
         `take` receives the bytes of each sample and its writer's handle.
         """
-        reader = DataReader(self._place.participant, topic, qos=qos)
+        reader = DataReader(self._context.participant, topic, qos=qos)
 
         def take_all(samples: list[Any]) -> None:
             for sample in samples:
                 if sample.sample_info.valid_data:  # else it only reports that a writer has left
                     take(sample.cdr, sample.sample_info.publication_handle)
 
-        self._listened.append(self._place.ear.listen(reader, take_all))
+        self._listened.append(self._context.reader_thread.listen(reader, take_all))
         return self._add(topic, reader, writes=False)
 
     def _add(self, topic: Topic, entity: Any, *, writes: bool) -> Any:
         self._topics.append(topic)
         self._entities.append((entity, writes))
-        self._place.record.add(self._node, entity, writes=writes)
+        self._context.record.add(self._node, entity, writes=writes)
         return entity
 
     def close(self) -> None:
         """Deletes the entities; further calls do nothing."""
         while self._listened:
-            self._place.ear.forget(self._listened.pop())
+            self._context.reader_thread.forget(self._listened.pop())
         while self._entities:
             entity, writes = self._entities.pop()
-            self._place.record.remove(self._node, entity, writes=writes)
+            self._context.record.remove(self._node, entity, writes=writes)
             library.delete(entity)
         while self._topics:
             library.delete(self._topics.pop())
@@ -102,10 +102,10 @@ class _Endpoint:
 class DdsWriter(_Endpoint):
     """A publisher."""
 
-    def __init__(self, place: DdsTopicName, spec: TopicSpec) -> None:
-        super().__init__(place, spec.node)
+    def __init__(self, context: DdsContext, spec: TopicSpec) -> None:
+        super().__init__(context, spec.node)
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
-        topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
+        topic = Topic(context.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
         self._writer = self._add_writer(topic, qos_of(spec.profile, user_data))
 
     @property
@@ -121,19 +121,19 @@ class DdsWriter(_Endpoint):
 class DdsReader(_Endpoint):
     """A subscription."""
 
-    def __init__(self, place: DdsTopicName, spec: TopicSpec, take: TakeMessage) -> None:
-        super().__init__(place, spec.node)
+    def __init__(self, context: DdsContext, spec: TopicSpec, take: TakeMessage) -> None:
+        super().__init__(context, spec.node)
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
-        topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
+        topic = Topic(context.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
         self._add_reader(topic, qos_of(spec.profile, user_data), lambda data, _writer: take(data))
 
 
 class DdsServer(_Endpoint):
     """A service server."""
 
-    def __init__(self, place: DdsTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
-        super().__init__(place, spec.node)
-        requests, replies = _topics(place, spec)
+    def __init__(self, context: DdsContext, spec: ServiceSpec, take: TakeRequest) -> None:
+        super().__init__(context, spec.node)
+        requests, replies = _topics(context, spec)
         qos = qos_of(SERVICES, _identity(SERVER))
         self._writer = self._add_writer(replies, qos)
         self._name, self._srvtype = spec.service, spec.srvtype
@@ -192,9 +192,9 @@ class DdsServer(_Endpoint):
 class DdsCaller(_Endpoint):
     """A client of a service."""
 
-    def __init__(self, place: DdsTopicName, spec: ServiceSpec) -> None:
-        super().__init__(place, spec.node)
-        requests, replies = _topics(place, spec)
+    def __init__(self, context: DdsContext, spec: ServiceSpec) -> None:
+        super().__init__(context, spec.node)
+        requests, replies = _topics(context, spec)
         qos = qos_of(SERVICES, _identity(CLIENT))
         self._writer = self._add_writer(requests, qos)
         self._guid = random.SystemRandom().getrandbits(64)
@@ -223,7 +223,7 @@ class DdsCaller(_Endpoint):
         number = next(self._numbers)
         with self._lock:
             self._waiting[number] = (on_response, on_loss)
-            lost = len(self._waiting) > _MOST_WAITING and self._waiting.pop(min(self._waiting))
+            lost = len(self._waiting) > _MAX_WAITING and self._waiting.pop(min(self._waiting))
         if lost:
             lost[1]()
         header = _HEADER.pack(self._guid, number)
@@ -255,13 +255,13 @@ class DdsCaller(_Endpoint):
             waiting[0](_without_header(data))
 
 
-def _topics(place: DdsTopicName, spec: ServiceSpec) -> tuple[Topic, Topic]:
+def _topics(context: DdsContext, spec: ServiceSpec) -> tuple[Topic, Topic]:
     """Returns the topics of a service's requests and replies."""
     requests = request_struct(f"{spec.srvtype}_Request")
     responses = request_struct(f"{spec.srvtype}_Response")
     return (
-        Topic(place.participant, dds_request_topic(spec.service), requests),
-        Topic(place.participant, dds_reply_topic(spec.service), responses),
+        Topic(context.participant, dds_request_topic(spec.service), requests),
+        Topic(context.participant, dds_reply_topic(spec.service), responses),
     )
 
 

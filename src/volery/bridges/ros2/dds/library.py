@@ -68,7 +68,7 @@ _durability = _function(
 
 _BEST_EFFORT, _VOLATILE = 0, 0
 """Values DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE."""
-_MOST_AT_ONCE = 256
+_MAX_RESULTS = 256
 _ALIGNMENT = 4
 
 
@@ -98,9 +98,9 @@ def detach(waitset: Any, condition: Any) -> None:
 
 def wait(waitset: Any, timeout_ns: int) -> list[int] | None:
     """Returns numbers of true conditions; empty after `timeout_ns`, None after deletion."""
-    found = (ctypes.c_ssize_t * _MOST_AT_ONCE)()
-    count = _wait(waitset._ref, found, _MOST_AT_ONCE, timeout_ns)
-    return None if count < 0 else found[: min(count, _MOST_AT_ONCE)]
+    found = (ctypes.c_ssize_t * _MAX_RESULTS)()
+    count = _wait(waitset._ref, found, _MAX_RESULTS, timeout_ns)
+    return None if count < 0 else found[: min(count, _MAX_RESULTS)]
 
 
 def subscriptions(writer: Any) -> int:
@@ -113,9 +113,9 @@ def readers_of(writer: Any) -> list[int]:
 
     None after deletion.
     """
-    found = (ctypes.c_uint64 * _MOST_AT_ONCE)()
-    count = int(_matched(writer._ref, found, _MOST_AT_ONCE))
-    return found[: min(max(count, 0), _MOST_AT_ONCE)]
+    found = (ctypes.c_uint64 * _MAX_RESULTS)()
+    count = int(_matched(writer._ref, found, _MAX_RESULTS))
+    return found[: min(max(count, 0), _MAX_RESULTS)]
 
 
 def publications(reader: Any) -> int:
@@ -137,8 +137,8 @@ def user_data(qos: int) -> bytes:
 def is_reliable(qos: int) -> bool:
     """Returns whether a `dds_qos_t` is not best effort."""
     kind = ctypes.c_int()
-    told = _reliability(qos, ctypes.byref(kind), ctypes.byref(ctypes.c_int64()))
-    return not (told and kind.value == _BEST_EFFORT)
+    has_reliability = _reliability(qos, ctypes.byref(kind), ctypes.byref(ctypes.c_int64()))
+    return not (has_reliability and kind.value == _BEST_EFFORT)
 
 
 def is_latched(qos: int) -> bool:

@@ -11,9 +11,9 @@ from volery.bridges.ros2.dds.discovery_info import DiscoveryInfo
 from volery.bridges.ros2.dds.domain import join_domain, leave_domain
 from volery.bridges.ros2.dds.endpoints import (
     DdsCaller,
+    DdsContext,
     DdsReader,
     DdsServer,
-    DdsTopicName,
     DdsWriter,
 )
 from volery.bridges.ros2.dds.reader_thread import ReaderThread
@@ -42,15 +42,15 @@ class DdsParticipant:
     def __init__(self, domain_id: int, interfaces: Sequence[str] = ()) -> None:
         self._domain_id = domain_id
         self._participant = join_domain(domain_id, tuple(interfaces))
-        reach = ", ".join(interfaces) or "this machine"
-        self.where = f"DDS domain {domain_id} ({reach})"
+        interface_names = ", ".join(interfaces) or "this machine"
+        self.where = f"DDS domain {domain_id} ({interface_names})"
         self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
         self._servers: weakref.WeakSet[DdsServer] = weakref.WeakSet()
         self._lock = threading.Lock()
-        self._ear = ReaderThread(self._participant, self._check_callers)
+        self._reader_thread = ReaderThread(self._participant, self._check_callers)
         self._record = DiscoveryInfo(self._participant)
-        self._place = DdsTopicName(self._participant, self._ear, self._record)
-        self._discovery = Discovery(self._participant, self._ear)
+        self._context = DdsContext(self._participant, self._reader_thread, self._record)
+        self._discovery = Discovery(self._participant, self._reader_thread)
         self._discovery.when_changed(self._check_clients)
         self._closed = False
 
@@ -68,15 +68,15 @@ class DdsParticipant:
 
     def writer(self, spec: TopicSpec) -> DdsWriter:
         """Creates a publisher."""
-        return DdsWriter(self._place, spec)
+        return DdsWriter(self._context, spec)
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> DdsReader:
         """Creates a subscription."""
-        return DdsReader(self._place, spec, take)
+        return DdsReader(self._context, spec, take)
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> DdsServer:
         """Creates a service."""
-        server = DdsServer(self._place, spec, take)
+        server = DdsServer(self._context, spec, take)
         with self._lock:
             self._servers.add(server)
         server.look_at(self._discovery.foreign_clients())
@@ -85,7 +85,7 @@ class DdsParticipant:
 
     def caller(self, spec: ServiceSpec) -> DdsCaller:
         """Creates a client of a service."""
-        caller = DdsCaller(self._place, spec)
+        caller = DdsCaller(self._context, spec)
         with self._lock:
             self._callers.add(caller)
         return caller
@@ -110,7 +110,7 @@ class DdsParticipant:
         """Leaves the graph; further calls do nothing."""
         if not self._closed:
             self._closed = True
-            self._ear.close()
+            self._reader_thread.close()
             leave_domain(self._domain_id, self._participant)
 
     def _check_clients(self) -> None:

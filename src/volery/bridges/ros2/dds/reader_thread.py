@@ -23,7 +23,7 @@ from cyclonedds.domain import DomainParticipant
 from volery.bridges.ros2.dds import library
 
 _ANY = ViewState.Any | InstanceState.Any | SampleState.NotRead
-_MOST_AT_ONCE = 100
+_MAX_BATCH = 100
 """Samples of one reader before others have their turn."""
 _PERIOD_S = 0.2
 
@@ -92,7 +92,7 @@ class ReaderThread:
             return
         reader, _, take = found
         try:
-            take(reader.take(_MOST_AT_ONCE))
+            take(reader.take(_MAX_BATCH))
         except DDSException:  # deleted meanwhile
             return
         except Exception:  # an error of one reader must not end the others

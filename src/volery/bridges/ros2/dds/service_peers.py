@@ -37,7 +37,7 @@ def why_foreign(word: str, key: bytes) -> str:
     )
 
 
-_MOST_KNOWN = 10_000
+_MAX_KNOWN = 10_000
 
 
 class ServicePeers:
@@ -59,7 +59,7 @@ class ServicePeers:
             found = self._look_up(handle)
             if found is None or found.terms is None:
                 return ""
-            if len(self._known) >= _MOST_KNOWN:
+            if len(self._known) >= _MAX_KNOWN:
                 self._known.clear()
             is_marked = self._mark in found.terms.user_data
             known = "" if is_marked else why_foreign(self._word, found.key)

@@ -33,6 +33,6 @@ def profile_of(offered: Any) -> Profile:
 
 def remote_publisher(topic: str, info: Any) -> RemotePublisher:
     """Returns a publisher from rclpy's `TopicEndpointInfo`."""
-    told = str(getattr(info, "topic_type_hash", ""))  # Humble has none
-    type_hash = told if told.startswith("RIHS") else None
+    text = str(getattr(info, "topic_type_hash", ""))  # Humble has none
+    type_hash = text if text.startswith("RIHS") else None
     return RemotePublisher(topic, info.topic_type, profile_of(info.qos_profile), type_hash)

@@ -30,7 +30,7 @@ _LONGEST_CALL_S = 3600.0
 """Timeout of calls; results of actions take their time."""
 
 
-class ZenohTopicName:
+class ZenohContext:
     """Context of endpoints."""
 
     def __init__(self, session: Any, domain_id: int, ids: Callable[[Any], tuple[int, int]]) -> None:
@@ -48,8 +48,8 @@ class ZenohTopicName:
 class ZenohWriter:
     """A publisher; latched messages are in a cache that late subscribers query."""
 
-    def __init__(self, place: ZenohTopicName, spec: TopicSpec) -> None:
-        key = topic_key(place.domain_id, spec.topic, spec.msgtype)
+    def __init__(self, context: ZenohContext, spec: TopicSpec) -> None:
+        key = topic_key(context.domain_id, spec.topic, spec.msgtype)
         profile = spec.profile
         reliability = (
             zenoh.Reliability.RELIABLE if profile.reliable else zenoh.Reliability.BEST_EFFORT
@@ -61,18 +61,20 @@ class ZenohWriter:
         self._latched = profile.latched
         if profile.latched:
             self._publisher = zenoh.ext.declare_advanced_publisher(
-                place.session,
+                context.session,
                 key,
                 cache=zenoh.ext.CacheConfig(profile.depth),
                 publisher_detection=True,
                 **how,
             )
         else:
-            self._publisher = place.session.declare_publisher(key, **how)
+            self._publisher = context.session.declare_publisher(key, **how)
         self._gid = os.urandom(GID_BYTES)
         self._numbers = itertools.count(1)
-        ids = place.ids(spec.node)
-        self._token = place.declare(topic_token(place.domain_id, place.zid, ids, PUBLISHER, spec))
+        ids = context.ids(spec.node)
+        self._token = context.declare(
+            topic_token(context.domain_id, context.zid, ids, PUBLISHER, spec)
+        )
 
     @property
     def matched(self) -> bool:
@@ -92,8 +94,8 @@ class ZenohWriter:
 class ZenohReader:
     """A subscription."""
 
-    def __init__(self, place: ZenohTopicName, spec: TopicSpec, take: TakeMessage) -> None:
-        key = topic_key(place.domain_id, spec.topic, spec.msgtype)
+    def __init__(self, context: ZenohContext, spec: TopicSpec, take: TakeMessage) -> None:
+        key = topic_key(context.domain_id, spec.topic, spec.msgtype)
 
         def receive(sample: Any) -> None:
             take(sample.payload.to_bytes())
@@ -104,11 +106,11 @@ class ZenohReader:
                 detect_late_publishers=True, max_samples=spec.profile.depth
             )
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
-            place.session, key, receive, allowed_origin=zenoh.Locality.REMOTE, history=history
+            context.session, key, receive, allowed_origin=zenoh.Locality.REMOTE, history=history
         )
-        ids = place.ids(spec.node)
-        self._token = place.declare(
-            topic_token(place.domain_id, place.zid, ids, SUBSCRIPTION, spec)
+        ids = context.ids(spec.node)
+        self._token = context.declare(
+            topic_token(context.domain_id, context.zid, ids, SUBSCRIPTION, spec)
         )
 
     def close(self) -> None:
@@ -119,12 +121,16 @@ class ZenohReader:
 class ZenohServer:
     """A service server."""
 
-    def __init__(self, place: ZenohTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
-        self._key = service_key(place.domain_id, spec.service, spec.srvtype)
+    def __init__(self, context: ZenohContext, spec: ServiceSpec, take: TakeRequest) -> None:
+        self._key = service_key(context.domain_id, spec.service, spec.srvtype)
         self._take = take
-        self._queryable = place.session.declare_queryable(self._key, self._on_query, complete=True)
-        ids = place.ids(spec.node)
-        self._token = place.declare(service_token(place.domain_id, place.zid, ids, SERVER, spec))
+        self._queryable = context.session.declare_queryable(
+            self._key, self._on_query, complete=True
+        )
+        ids = context.ids(spec.node)
+        self._token = context.declare(
+            service_token(context.domain_id, context.zid, ids, SERVER, spec)
+        )
 
     def close(self) -> None:
         """Destroys the service."""
@@ -149,18 +155,20 @@ class ZenohCaller:
     """A client of a service."""
 
     def __init__(
-        self, place: ZenohTopicName, spec: ServiceSpec, is_there: Callable[[ServiceSpec], bool]
+        self, context: ZenohContext, spec: ServiceSpec, is_there: Callable[[ServiceSpec], bool]
     ) -> None:
-        self._place = place
+        self._context = context
         self._spec = spec
         self._is_there = is_there
-        self._key = service_key(place.domain_id, spec.service, spec.srvtype)
+        self._key = service_key(context.domain_id, spec.service, spec.srvtype)
         self._gid = os.urandom(GID_BYTES)
         self._numbers = itertools.count(1)
         self._waiting: set[_Query] = set()
         self._lock = threading.Lock()
-        ids = place.ids(spec.node)
-        self._token = place.declare(service_token(place.domain_id, place.zid, ids, CLIENT, spec))
+        ids = context.ids(spec.node)
+        self._token = context.declare(
+            service_token(context.domain_id, context.zid, ids, CLIENT, spec)
+        )
 
     @property
     def ready(self) -> bool:
@@ -174,20 +182,20 @@ class ZenohCaller:
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Sends a request."""
-        question = _Query(on_response, on_loss)
+        query = _Query(on_response, on_loss)
         with self._lock:
-            self._waiting.add(question)
+            self._waiting.add(query)
 
         def receive(reply: Any) -> None:
             with self._lock:
-                self._waiting.discard(question)
+                self._waiting.discard(query)
             if reply.ok is None:
-                question.lose()
+                query.lose()
             else:
-                question.answer(reply.ok.payload.to_bytes())
+                query.answer(reply.ok.payload.to_bytes())
 
         attachment = Attachment(next(self._numbers), time.time_ns(), self._gid)
-        self._place.session.get(
+        self._context.session.get(
             self._key,
             receive,
             target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -210,8 +218,8 @@ class ZenohCaller:
     def _lose_all(self) -> None:
         with self._lock:
             waiting, self._waiting = self._waiting, set()
-        for question in waiting:
-            question.lose()
+        for query in waiting:
+            query.lose()
 
 
 class _Query:

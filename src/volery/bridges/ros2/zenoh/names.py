@@ -22,7 +22,7 @@ _KEEP_LAST = 1  # rmw_qos_history_policy_e
 _REST = ",:,:,,"
 """Deadline, lifespan and liveliness: at their defaults."""
 _ENDPOINT_PARTS = 13
-_MOST_DIGITS = 10
+_MAX_DIGITS = 10
 _ATTACHMENT = struct.Struct("<qqB16s")
 GID_BYTES = 16
 
@@ -101,8 +101,8 @@ def _endpoint(
     name: str,
     what: str,
 ) -> str:
-    place = f"{SPACE}/{domain_id}/{session}/{ids[0]}/{ids[1]}/{kind}"
-    return f"{place}/{_node_words(node)}/{_mangled(name)}/{what}"
+    prefix = f"{SPACE}/{domain_id}/{session}/{ids[0]}/{ids[1]}/{kind}"
+    return f"{prefix}/{_node_words(node)}/{_mangled(name)}/{what}"
 
 
 def qos_words(profile: Profile) -> str:
@@ -133,7 +133,7 @@ def _read_qos(words: str) -> Profile:
     return Profile(
         reliable=reliability != str(_BEST_EFFORT),
         latched=durability == str(_TRANSIENT_LOCAL),
-        depth=int(depth) if depth.isdecimal() and len(depth) < _MOST_DIGITS else Profile().depth,
+        depth=int(depth) if depth.isdecimal() and len(depth) < _MAX_DIGITS else Profile().depth,
     )
 
 

@@ -21,9 +21,9 @@ from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.type_hashes import service_hash
 from volery.bridges.ros2.zenoh.endpoints import (
     ZenohCaller,
+    ZenohContext,
     ZenohReader,
     ZenohServer,
-    ZenohTopicName,
     ZenohWriter,
 )
 from volery.bridges.ros2.zenoh.names import (
@@ -52,9 +52,9 @@ class ZenohParticipant:
 
     def __init__(self, domain_id: int, router: str = "") -> None:
         self._domain_id = domain_id
-        self._session, reach = open_session(router)
-        self.where = f"{reach}, domain {domain_id}"
-        self._place = ZenohTopicName(self._session, domain_id, self._ids)
+        self._session, router_name = open_session(router)
+        self.where = f"{router_name}, domain {domain_id}"
+        self._context = ZenohContext(self._session, domain_id, self._ids)
         self._numbers = itertools.count()
         self._lock = threading.RLock()
         self._nodes: dict[NodeName, tuple[int, Any]] = {}
@@ -71,8 +71,8 @@ class ZenohParticipant:
         with self._lock:
             if node not in self._nodes:
                 number = next(self._numbers)
-                token = node_token(self._domain_id, self._place.zid, number, node)
-                self._nodes[node] = number, self._place.declare(token)
+                token = node_token(self._domain_id, self._context.zid, number, node)
+                self._nodes[node] = number, self._context.declare(token)
 
     def remove_node(self, node: NodeName) -> None:
         """Removes a node."""
@@ -86,19 +86,19 @@ class ZenohParticipant:
 
     def writer(self, spec: TopicSpec) -> ZenohWriter:
         """Creates a publisher."""
-        return ZenohWriter(self._place, spec)
+        return ZenohWriter(self._context, spec)
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> ZenohReader:
         """Creates a subscription."""
-        return ZenohReader(self._place, spec, take)
+        return ZenohReader(self._context, spec, take)
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> ZenohServer:
         """Creates a service."""
-        return ZenohServer(self._place, spec, take)
+        return ZenohServer(self._context, spec, take)
 
     def caller(self, spec: ServiceSpec) -> ZenohCaller:
         """Creates a client of a service."""
-        caller = ZenohCaller(self._place, spec, self._is_there)
+        caller = ZenohCaller(self._context, spec, self._is_there)
         with self._lock:
             self._callers.add(caller)
         return caller
@@ -145,7 +145,7 @@ class ZenohParticipant:
     def _on_token(self, sample: Any) -> None:
         token = str(sample.key_expr)
         endpoint = read_token(token)
-        if endpoint is None or endpoint.session == self._place.zid:
+        if endpoint is None or endpoint.session == self._context.zid:
             return
         with self._lock:
             if sample.kind == zenoh.SampleKind.PUT:

@@ -69,12 +69,12 @@ def _acceleration(context: AutopilotContext) -> Values:
 
 def _local_position(context: AutopilotContext) -> Values:
     time_us, memory = motion.us(context), context.memory
-    place, velocity = motion.local_motion(context)
+    position, velocity = motion.local_motion(context)
     heading = math.remainder(0.5 * math.pi - context.yaw, 2.0 * math.pi)
     has_fix = not memory.fix_lost
     return (
         *(time_us, time_us, has_fix, True, has_fix, True),
-        *place,
+        *position,
         *velocity,
         velocity[2],
         *ned_of_enu(context.state.acceleration),

@@ -26,7 +26,7 @@ _STANDARD = {
 }
 """MAV_STANDARD_MODE of modes; the others have a name instead."""
 _NAMES = {Mode.HOLD: b"Hold", Mode.OFFBOARD: b"Offboard", Mode.FOLLOW_TARGET: b"Follow Target"}
-_OLDEST, _SPOKEN = 100, 200
+_MIN_VERSION, _VERSION = 100, 200
 """Versions of MAVLink, times a hundred: both are received, 2 is sent."""
 
 
@@ -77,9 +77,9 @@ class CurrentMode(_Message):
 def protocol_version(_context: AutopilotContext) -> Any:
     """Returns the supported versions of MAVLink."""
     return ProtocolVersion(
-        version=_SPOKEN,
-        min_version=_OLDEST,
-        max_version=_SPOKEN,
+        version=_VERSION,
+        min_version=_MIN_VERSION,
+        max_version=_VERSION,
         spec_version_hash=b"",
         library_version_hash=b"",
     )

@@ -63,7 +63,7 @@ def _heading_cdeg(context: AutopilotContext) -> int:
 
 def gps_raw_int(context: AutopilotContext) -> Any:
     """Returns GPS_RAW_INT from the estimate; without a fix if the UAV has lost its own."""
-    place = degrees_e7(context.geodetic())
+    position = degrees_e7(context.geodetic())
     north, east, _ = ned_of_enu(context.state.velocity)
     speed = math.hypot(north, east)
     course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
@@ -72,13 +72,13 @@ def gps_raw_int(context: AutopilotContext) -> Any:
     return dialect().MAVLink_gps_raw_int_message(
         us(context),
         fix,
-        *place,
+        *position,
         65535 if lost else 80,
         65535 if lost else 120,
         min(round(speed * 100.0), 65534),
         course if speed > 0.3 else 65535,
         satellites,
-        place[2],
+        position[2],
     )
 
 
@@ -101,20 +101,20 @@ def attitude_quaternion(context: AutopilotContext) -> Any:
 
 def local_position(context: AutopilotContext) -> Any:
     """Returns LOCAL_POSITION_NED, from the vehicle's position at the start."""
-    place, velocity = local_motion(context)
-    return dialect().MAVLink_local_position_ned_message(ms(context), *place, *velocity)
+    position, velocity = local_motion(context)
+    return dialect().MAVLink_local_position_ned_message(ms(context), *position, *velocity)
 
 
 def odometry(context: AutopilotContext) -> Any:
     """Returns ODOMETRY in the local frame, velocities too, as PX4 does; covariances are unknown."""
-    place, velocity = local_motion(context)
+    position, velocity = local_motion(context)
     x, y, z, w = q_ned_frd_of_enu_flu(context.state.attitude)
     unknown = [math.nan] + [0.0] * 20
     return dialect().MAVLink_odometry_message(
         us(context),
         _LOCAL_NED,
         _LOCAL_NED,
-        *place,
+        *position,
         [w, x, y, z],
         *velocity,
         *frd_of_flu(context.state.rates),
@@ -244,7 +244,7 @@ def attitude_target(context: AutopilotContext) -> Any:
 
 def servo_output(context: AutopilotContext) -> Any:
     """Returns SERVO_OUTPUT_RAW: fractions of full speed as pulses of 1000 to 2000 us."""
-    pulses = [round(1000.0 + 1000.0 * min(share, 1.0)) for share in context.state.rotors]
+    pulses = [round(1000.0 + 1000.0 * min(fraction, 1.0)) for fraction in context.state.rotors]
     pulses = (pulses + [0] * 16)[:16]
     return dialect().MAVLink_servo_output_raw_message(
         us(context) & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]

@@ -11,7 +11,7 @@ _PX4 = 12
 """Value MAV_AUTOPILOT_PX4."""
 _CHUNK = 50
 """Characters of a STATUSTEXT."""
-_MOST_CHUNKS = 256
+_MAX_CHUNKS = 256
 """Chunks that `chunk_seq` can number."""
 
 
@@ -32,7 +32,7 @@ def status_texts(severity: int, text: str, number: int) -> list[Any]:
 
     A receiver that joins chunks knows the last one by its NUL, so that one is never full.
     """
-    raw = text.replace("\0", "?").encode("ascii", "replace")[: _MOST_CHUNKS * _CHUNK - 1]
+    raw = text.replace("\0", "?").encode("ascii", "replace")[: _MAX_CHUNKS * _CHUNK - 1]
     status = dialect().MAVLink_statustext_message
     if len(raw) <= _CHUNK:
         return [status(severity, raw, 0, 0)]

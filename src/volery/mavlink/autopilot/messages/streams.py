@@ -42,7 +42,7 @@ RATES_HZ: dict[int, dict[int, float]] = {
     GROUND: _NORMAL,
 }
 """Rates by profile and message id."""
-FASTEST_NS = 10_000_000
+MIN_PERIOD_NS = 10_000_000
 """Period of the vehicle's state."""
 _HEARTBEAT = 0
 """Message whose rate cannot be changed."""
@@ -56,7 +56,7 @@ def begin(link: LinkState, now_ns: int) -> LinkState:
     return link
 
 
-def ask_for(link: LinkState, number: int, period_us: float, now_ns: int) -> bool:
+def set_period(link: LinkState, number: int, period_us: float, now_ns: int) -> bool:
     """Sets the period of a message on a link: 0 the default, -1 never.
 
     Returns whether the period is possible. The rate is limited to that of the vehicle's state.
@@ -68,9 +68,9 @@ def ask_for(link: LinkState, number: int, period_us: float, now_ns: int) -> bool
         return True
     usual = RATES_HZ.get(link.profile, _ALWAYS).get(number)
     if period_us == 0.0 and usual is None:
-        return ask_for(link, number, -1.0, now_ns)
+        return set_period(link, number, -1.0, now_ns)
     wanted = 1e9 / usual if period_us == 0.0 and usual is not None else period_us * 1e3
-    link.periods_ns[number] = max(FASTEST_NS, round(min(wanted, 1e15)))
+    link.periods_ns[number] = max(MIN_PERIOD_NS, round(min(wanted, 1e15)))
     link.due = [entry for entry in link.due if entry[1] != number]
     heapq.heapify(link.due)
     heapq.heappush(link.due, (now_ns, number))

@@ -94,8 +94,8 @@ def _battery_status(context: AutopilotContext) -> Any:
 
 
 def _global_origin(context: AutopilotContext) -> Any:
-    place = motion.degrees_e7(context.earth.geodetic(context.memory.origin))
-    return dialect().MAVLink_gps_global_origin_message(*place, motion.us(context))
+    position = motion.degrees_e7(context.earth.geodetic(context.memory.origin))
+    return dialect().MAVLink_gps_global_origin_message(*position, motion.us(context))
 
 
 def _estimator_status(context: AutopilotContext) -> Any:

@@ -25,9 +25,9 @@ _MOVES_M_S = 0.1
 """Speed above which a velocity defines a course."""
 _HEIGHT_FIRST_M = 3.0
 """Height difference below which the UAV moves along the ground."""
-_LOWEST_M, _ASCENT_M_S = 1.0, 0.5
+_MIN_HEIGHT_M, _ASCENT_M_S = 1.0, 0.5
 """Height above home below which the UAV climbs, whatever the target's altitude, and its speed."""
-_FARTHEST_M = 1e6
+_MAX_DISTANCE_M = 1e6
 _PERIOD_NS = 20_000_000
 _FACED_M = 1.0
 """Distance along the ground below which the UAV does not face the target."""
@@ -41,9 +41,9 @@ def take(context: AutopilotContext, _source: Source, message: Any) -> None:
     numbers = (latitude, longitude, message.alt)
     if not all(map(math.isfinite, numbers)) or abs(latitude) > 90.0 or abs(longitude) > 180.0:
         return
-    x, y, _ = context.earth.place(latitude, longitude, 0.0)
+    x, y, _ = context.earth.map_position(latitude, longitude, 0.0)
     measured = x, y, message.alt - context.build.origin[2]
-    if any(abs(part) > _FARTHEST_M for part in measured):
+    if any(abs(part) > _MAX_DISTANCE_M for part in measured):
         return
     vx, vy, vz = message.vel
     velocity = enu_of_ned((vx, vy, vz))
@@ -63,9 +63,9 @@ def _fuse(
     context: AutopilotContext, target: FollowTarget, measured: Vector, velocity: Vector | None
 ) -> None:
     """Corrects an estimate by a measurement: PX4's filter with FLW_TGT_RS."""
-    share = min(max(float(context.parameter("FLW_TGT_RS")), 0.1), 1.0)
-    beta = share ** (1.0 / 3.0)
-    gain, rate_gain = 1.0 - share, 1.5 * (1.0 - beta) ** 2 * (1.0 + beta)
+    responsiveness = min(max(float(context.parameter("FLW_TGT_RS")), 0.1), 1.0)
+    beta = responsiveness ** (1.0 / 3.0)
+    gain, rate_gain = 1.0 - responsiveness, 1.5 * (1.0 - beta) ** 2 * (1.0 + beta)
     velocity_gain = 1.0 - (0.9 * beta) ** 2
     elapsed_s = min(max((context.memory.now_ns - target.time_ns) * 1e-9, 1e-3), 20.0)
     predicted = _position_now(context, target)
@@ -74,7 +74,8 @@ def _fuse(
     vx, vy, vz = (v + rate_gain / elapsed_s * o for v, o in zip(target.velocity, off, strict=True))
     if velocity is not None:
         vx, vy, vz = (
-            v + velocity_gain * (told - v) for v, told in zip((vx, vy, vz), velocity, strict=True)
+            v + velocity_gain * (measured_v - v)
+            for v, measured_v in zip((vx, vy, vz), velocity, strict=True)
         )
     target.position, target.velocity = (x, y, z), (vx, vy, vz)
     target.time_ns = context.memory.now_ns
@@ -90,21 +91,21 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
     there = _position_now(context, target)
     moves = memory.now_ns - target.time_ns < _STALE_NS
     vx, vy, _ = target.velocity if moves else (0.0, 0.0, 0.0)
-    goal = _position_beside(context, target, there)
+    goal = _position_next_to(context, target, there)
     x, y, z = (wanted - here for wanted, here in zip(goal, state.position, strict=True))
     away = math.hypot(x, y)
     speed = min(
         approach_speed(away, float(context.parameter("MPC_ACC_HOR"))),
         float(context.parameter("FLW_TGT_MAX_VEL")),
     )
-    share = speed / away if away > 1e-6 else 0.0
-    level = (vx + share * x, vy + share * y) if abs(z) < _HEIGHT_FIRST_M else (0.0, 0.0)
-    most = float(context.parameter("MPC_XY_VEL_MAX"))
-    reduced = min(1.0, most / max(math.hypot(*level), 1e-6))
+    gain = speed / away if away > 1e-6 else 0.0
+    level = (vx + gain * x, vy + gain * y) if abs(z) < _HEIGHT_FIRST_M else (0.0, 0.0)
+    max_speed = float(context.parameter("MPC_XY_VEL_MAX"))
+    reduced = min(1.0, max_speed / max(math.hypot(*level), 1e-6))
     limit = float(context.parameter(f"MPC_Z_V_AUTO_{'UP' if z > 0.0 else 'DN'}"))
     brake = 0.5 * float(context.parameter("MPC_ACC_HOR"))
     climb = math.copysign(min(limit, approach_speed(abs(z), brake)), z)
-    if state.position[2] - memory.home_or_origin[2] < _LOWEST_M:
+    if state.position[2] - memory.home_or_origin[2] < _MIN_HEIGHT_M:
         level, climb = (0.0, 0.0), _ASCENT_M_S
     dx, dy = there[0] - state.position[0], there[1] - state.position[1]
     yaw = math.atan2(dy, dx) if math.hypot(dx, dy) > _FACED_M else None
@@ -120,7 +121,7 @@ def _position_now(context: AutopilotContext, target: FollowTarget) -> Vector:
     return x, y, z
 
 
-def _position_beside(context: AutopilotContext, target: FollowTarget, there: Vector) -> Vector:
+def _position_next_to(context: AutopilotContext, target: FollowTarget, there: Vector) -> Vector:
     """Returns the UAV's goal; next to a target without a course, on the UAV's own side."""
     if target.course is None:
         here = context.state.position

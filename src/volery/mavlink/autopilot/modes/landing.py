@@ -28,10 +28,10 @@ def follow(context: AutopilotContext, state: FlightState) -> None:
 
 def speed_at(context: AutopilotContext, height_m: float) -> float:
     """Returns the descent speed, m/s, at a height above ground."""
-    slow, fast, most = (
+    slow, fast, max_speed = (
         float(context.parameter(name))
         for name in ("MPC_LAND_SPEED", "MPC_Z_VEL_MAX_DN", "MPC_Z_V_AUTO_DN")
     )
     low = float(context.parameter("MPC_LAND_ALT2"))
     high = max(float(context.parameter("MPC_LAND_ALT1")), low)
-    return min(float(np.interp(height_m, (low, high), (slow, fast))), most)
+    return min(float(np.interp(height_m, (low, high), (slow, fast))), max_speed)

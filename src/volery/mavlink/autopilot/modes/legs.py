@@ -36,11 +36,13 @@ def fly_leg(context: AutopilotContext, leg: MissionLeg) -> bool:
         mode_transitions.order(context, "go_to", context.vehicle.go_to(leg.target, leg.yaw))
         return False
     speed = min(leg.speed, approach_speed(level, float(context.parameter("MPC_ACC_HOR"))))
-    way = "UP" if z > 0.0 else "DN"
-    limit = min(float(context.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
+    direction = "UP" if z > 0.0 else "DN"
+    limit = min(
+        float(context.parameter(f"MPC_Z_{kind}_{direction}")) for kind in ("V_AUTO", "VEL_MAX")
+    )
     climb = min(limit, approach_speed(abs(z), 0.5 * float(context.parameter("MPC_ACC_HOR"))))
-    share = speed / level if level > 1e-6 else 0.0
-    velocity = (share * x, share * y, math.copysign(climb, z))
+    fraction = speed / level if level > 1e-6 else 0.0
+    velocity = (fraction * x, fraction * y, math.copysign(climb, z))
     context.vehicle.steer(velocity, leg.yaw, 0.0)
     mode_transitions.order(context, "steer")
     return False

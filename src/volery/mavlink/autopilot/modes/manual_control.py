@@ -18,7 +18,7 @@ _HEIGHT_GAIN, _CLIMB_GAIN, _CLIMB_INTEGRAL = 1.0, 4.0, 2.0
 """
 _GRAVITY = 9.80665
 _TICK_S = 0.01
-_MOST_PUSH = 3.0
+_MAX_CLIMB_THRUST = 3.0
 """Limit of the integral, m/s^2 (modelling choice)."""
 _LIFT_M = 1.0
 """Height of a take-off by manual control (modelling choice)."""
@@ -33,10 +33,10 @@ def take(context: AutopilotContext, source: Source, message: Any) -> None:
         return
     memory = context.memory
     if memory.sticks.source not in (None, source) and mode_requirements.sticks_are_there(memory):
-        told = f"MANUAL_CONTROL of {source}"
-        if told not in memory.refused_messages:
-            memory.refused_messages.add(told)
-            context.say(4, f"Manual control of system {source[1]} ignored: another one controls")
+        refused = f"MANUAL_CONTROL of {source}"
+        if refused not in memory.refused_messages:
+            memory.refused_messages.add(refused)
+            context.report(4, f"Manual control of system {source[1]} ignored: another one controls")
         return
     forward, right, turn = (
         part / 1000.0 if -1000 <= part <= 1000 else 0.0
@@ -85,10 +85,10 @@ def fly_altitude(context: AutopilotContext, state: FlightState) -> None:
         wanted = _HEIGHT_GAIN * (memory.altitude_target - state.position[2])
     error = wanted - state.velocity[2]
     memory.climb_thrust += _CLIMB_INTEGRAL * error * _TICK_S
-    memory.climb_thrust = min(max(memory.climb_thrust, -_MOST_PUSH), _MOST_PUSH)
+    memory.climb_thrust = min(max(memory.climb_thrust, -_MAX_CLIMB_THRUST), _MAX_CLIMB_THRUST)
     push = _CLIMB_GAIN * error + memory.climb_thrust
-    most = math.radians(float(context.parameter("MPC_MAN_TILT_MAX")))
-    roll, pitch = right * most, forward * most
+    max_tilt = math.radians(float(context.parameter("MPC_MAN_TILT_MAX")))
+    roll, pitch = right * max_tilt, forward * max_tilt
     lean = math.cos(roll) * math.cos(pitch)
     thrust = context.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
     rate = yaw_rate(context)

@@ -17,14 +17,14 @@ from volery.mavlink.codec import dialect
 
 _FACES_RAD = math.radians(5.0)
 """Yaw error below which a heading is reached (modelling choice)."""
-_SHORTEST_RAD, _LED_RAD_S = math.radians(175.0), math.radians(45.0)
+_MIN_LED_TURN_RAD, _LED_RAD_S = math.radians(175.0), math.radians(45.0)
 """Turn from which the heading is led, so that it goes the right way round, and the rate of leading
 (modelling choices)."""
 _LOITER_RADIUS_M = 80.0
 """Radius of items without one: the default of PX4's NAV_LOITER_RAD."""
 _FACING = plans.PLACED - {plans.LAND, plans.TAKE_OFF}
 """Items on whose leg the UAV faces a region of interest."""
-_MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
+_MAX_STEPS = 2 * plans.MAX_ITEMS[plans.MISSION]
 """Limit of items passed at one instant, so that jumps cannot loop forever."""
 
 
@@ -36,13 +36,13 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
         if memory.leg is not None and state.mode != "LANDED":
             fly_leg(context, memory.leg)
         return
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         if mission is not memory.mission or mission.complete or memory.mode is not Mode.MISSION:
             return
         _face_interest(context, mission, items[mission.current])
         if not _do(context, mission, items[mission.current], state):
             return
-        _reach(context, mission)
+        _complete_item(context, mission)
         if memory.mission.stays:
             return
 
@@ -58,7 +58,7 @@ def _face_interest(context: AutopilotContext, mission: Mission, item: plans.Miss
         leg.yaw = bearing(context, mission.interest)
 
 
-def _reach(context: AutopilotContext, mission: Mission) -> None:
+def _complete_item(context: AutopilotContext, mission: Mission) -> None:
     """Reports that the current item is done, and proceeds to the next one."""
     mission.reached = mission.current
     context.links.send(dialect().MAVLink_mission_item_reached_message(mission.current))
@@ -72,7 +72,7 @@ def _reach(context: AutopilotContext, mission: Mission) -> None:
         mission.speed = math.nan
         if context.memory.mode is Mode.MISSION:  # else its last item was a return
             landed = context.state.mode == "LANDED"
-            context.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
+            context.report(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
 def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
@@ -138,8 +138,8 @@ def _set(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -
         speed = item.params[1]
         mission.speed = speed if speed > 0.0 else math.nan
     elif item.command in payload_items.INTEREST:
-        somewhere = payload_items.is_place_of_interest(item.command)
-        mission.interest = item_position(context, item) if somewhere else None
+        has_position = payload_items.is_roi_location(item.command)
+        mission.interest = item_position(context, item) if has_position else None
     elif item.command == plans.SET_HOME:
         if item.params[0] == 1.0 or not item.placed:
             home.set_here(context)
@@ -147,7 +147,7 @@ def _set(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -
             height = item_position(context, item)[2]
             why = home.choose(context, item.latitude, item.longitude, height)
             if why:
-                context.say(4, why)
+                context.report(4, why)
     return True
 
 
@@ -288,7 +288,7 @@ def _face(
         mission.turn = (context.yaw, _turn_of(item, context.yaw))
     start, turn = mission.turn
     rate = math.radians(rate_deg) if rate_deg > 0.0 else math.inf
-    if abs(turn) > _SHORTEST_RAD:
+    if abs(turn) > _MIN_LED_TURN_RAD:
         rate = min(rate, _LED_RAD_S)
     elapsed_s = (memory.now_ns - mission.since_ns) * 1e-9
     led = abs(turn) if math.isinf(rate) else min(rate * elapsed_s, abs(turn))

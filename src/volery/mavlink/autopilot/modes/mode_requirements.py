@@ -6,7 +6,7 @@ from volery.mavlink.autopilot.modes.modes import Mode
 from volery.mavlink.autopilot.protocols import plans
 from volery.mavlink.autopilot.state import AutopilotState
 
-_LEAST_OFFBOARD_HZ = 2.0
+_MIN_OFFBOARD_HZ = 2.0
 """Setpoint rate above which PX4 enters offboard."""
 
 
@@ -32,11 +32,11 @@ def sticks_are_there(memory: AutopilotState) -> bool:
 def offboard_is_fresh(memory: AutopilotState) -> bool:
     """Returns whether setpoints arrive often enough."""
     offboard, now_ns = memory.offboard, memory.now_ns
-    return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / _LEAST_OFFBOARD_HZ
+    return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / _MIN_OFFBOARD_HZ
 
 
 def ground_is_there(memory: AutopilotState) -> bool:
     """Returns whether a ground station's heartbeat has arrived within COM_DL_LOSS_T."""
-    heard_ns = memory.ground_heard_ns
+    heartbeat_ns = memory.ground_heartbeat_ns
     limit_ns = int(memory.parameters["COM_DL_LOSS_T"]) * 1_000_000_000
-    return heard_ns >= 0 and memory.now_ns - heard_ns <= limit_ns
+    return heartbeat_ns >= 0 and memory.now_ns - heartbeat_ns <= limit_ns

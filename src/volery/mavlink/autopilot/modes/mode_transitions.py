@@ -29,9 +29,9 @@ _FOLLOWS = {
     "": {"LANDED"},
 }
 """Modes of the UAV that follow from a command."""
-_OUTSIDE = {"TAKE_OFF": Mode.TAKE_OFF, "LAND": Mode.LAND, "RETURN": Mode.RETURN}
+_EXTERNAL_MODES = {"TAKE_OFF": Mode.TAKE_OFF, "LAND": Mode.LAND, "RETURN": Mode.RETURN}
 """Mode reported while another client controls the UAV; else: hold."""
-_PATIENCE_NS = 50_000_000
+_COMMAND_TIMEOUT_NS = 50_000_000
 """Time that a command may take to show in the UAV's mode."""
 
 
@@ -43,14 +43,16 @@ def flies(context: AutopilotContext) -> bool:
 def cruise(context: AutopilotContext) -> float:
     """Returns the cruise speed, m/s: of the mission, of a command, or of MPC_XY_CRUISE."""
     memory = context.memory
-    asked = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
-    speed = next((s for s in asked if math.isfinite(s)), float(context.parameter("MPC_XY_CRUISE")))
+    requested = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
+    speed = next(
+        (s for s in requested if math.isfinite(s)), float(context.parameter("MPC_XY_CRUISE"))
+    )
     return min(speed, float(context.parameter("MPC_XY_VEL_MAX")))
 
 
-def go_to(context: AutopilotContext, place: Vector, yaw: float | None) -> None:
+def go_to(context: AutopilotContext, position: Vector, yaw: float | None) -> None:
     """Flies to a position at cruise speed."""
-    context.memory.leg = MissionLeg(place, yaw, cruise(context))
+    context.memory.leg = MissionLeg(position, yaw, cruise(context))
 
 
 def obstacle_to(context: AutopilotContext, mode: Mode) -> str:
@@ -65,7 +67,7 @@ def obstacle_to(context: AutopilotContext, mode: Mode) -> str:
     return mode_requirements.missing(context.memory, mode)
 
 
-def ask_for(context: AutopilotContext, mode: Mode) -> str:
+def request_mode(context: AutopilotContext, mode: Mode) -> str:
     """Enters a requested mode; returns why not, empty if entered.
 
     A disarmed UAV may enter any mode: missing requirements prevent arming, as in PX4.
@@ -82,7 +84,7 @@ def enter(context: AutopilotContext, mode: Mode) -> None:
     memory = context.memory
     changed = memory.mode is not mode
     memory.mode = mode
-    memory.leg = memory.way_home = memory.target = None
+    memory.leg = memory.return_state = memory.target = None
     memory.altitude_target = math.nan
     if mode is not Mode.FOLLOW_TARGET:
         memory.followed = None
@@ -110,10 +112,10 @@ def rise(context: AutopilotContext) -> None:
         height = float(context.parameter("MIS_TAKEOFF_ALT"))
     memory = context.memory
     x, y, z = context.state.position
-    if memory.take_off_place is not None:
-        x, y = memory.take_off_place
+    if memory.take_off_position is not None:
+        x, y = memory.take_off_position
     requested = math.isfinite(memory.take_off_height)
-    memory.take_off_height, memory.take_off_place = math.nan, None
+    memory.take_off_height, memory.take_off_position = math.nan, None
     if not flies(context):
         height = max(height, 0.1)
         memory.take_off_goal = x, y, z + height
@@ -129,7 +131,7 @@ def order(context: AutopilotContext, what: str, why_not: str = "") -> None:
     context.memory.ordered_ns = context.memory.now_ns
     if why_not:
         context.memory.order = ""
-        context.say(4, why_not)
+        context.report(4, why_not)
 
 
 def follow_vehicle(context: AutopilotContext, state: FlightState) -> None:
@@ -137,18 +139,18 @@ def follow_vehicle(context: AutopilotContext, state: FlightState) -> None:
     memory = context.memory
     if state.crashed:
         if memory.armed:
-            context.say(0, "Crash detected: motors stopped")
+            context.report(0, "Crash detected: motors stopped")
             arming.finish(context, "Disarmed")
         return
-    settled = memory.now_ns - memory.ordered_ns > _PATIENCE_NS
+    settled = memory.now_ns - memory.ordered_ns > _COMMAND_TIMEOUT_NS
     if settled and state.mode not in _FOLLOWS.get(memory.order, {memory.order}):
         _step_back(context, state)
     if state.airborne and not memory.airborne and memory.armed:
         memory.airborne = True
-        context.say(6, "Takeoff detected")
+        context.report(6, "Takeoff detected")
     if state.mode == "LANDED" and memory.airborne:
         memory.airborne, memory.landed_ns = False, memory.now_ns
-        context.say(6, "Landing detected")
+        context.report(6, "Landing detected")
         memory.order, memory.leg = "", None
     if memory.armed and state.mode == "LANDED" and not _begins(context):
         _disarm_in_time(context)
@@ -158,13 +160,13 @@ def _step_back(context: AutopilotContext, state: FlightState) -> None:
     """Reports that another client controls the UAV, and stops sending commands."""
     memory = context.memory
     memory.order = state.mode if state.mode != "LANDED" else ""
-    memory.leg = memory.way_home = None
+    memory.leg = memory.return_state = None
     if state.mode == "LANDED":
         return
     if not memory.armed:
         memory.armed, memory.armed_ns = True, memory.now_ns
         memory.home = memory.home or state.position
-    mode = _OUTSIDE.get(state.mode, Mode.HOLD)
+    mode = _EXTERNAL_MODES.get(state.mode, Mode.HOLD)
     if mode is not memory.mode:
         memory.mode = mode
     context.announce()

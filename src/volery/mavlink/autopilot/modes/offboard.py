@@ -46,7 +46,7 @@ def take_local(context: AutopilotContext, source: Source, message: Any) -> None:
 
 def take_global(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_POSITION_TARGET_GLOBAL_INT."""
-    x, y, _ = context.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
+    x, y, _ = context.earth.map_position(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
     above = message.coordinate_frame in _ABOVE_HOME
     home = context.memory.home_or_origin
     z = message.alt + (home[2] if above else -context.build.origin[2])
@@ -69,7 +69,7 @@ def _read(
     try:
         setpoint = convert()
     except CommandError as error:
-        context.complain(f"{message.get_type()} {error}")
+        context.report_refusal(f"{message.get_type()} {error}")
         return
     take(context, source, setpoint)
 
@@ -79,10 +79,12 @@ def take(context: AutopilotContext, source: Source, setpoint: OffboardSetpoint) 
     memory = context.memory
     offboard, now_ns = memory.offboard, memory.now_ns
     if source != offboard.source:
-        if offboard.source is not None and not _is_lost(context):
+        if offboard.source is not None and not _is_stale(context):
             if source not in offboard.refused:
                 offboard.refused.add(source)
-                context.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
+                context.report(
+                    4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies"
+                )
             return
         offboard.source = source
         offboard.refused.clear()
@@ -91,7 +93,7 @@ def take(context: AutopilotContext, source: Source, setpoint: OffboardSetpoint) 
         _fly(context, memory.state, setpoint, fresh=True)
 
 
-def _is_lost(context: AutopilotContext) -> bool:
+def _is_stale(context: AutopilotContext) -> bool:
     limit_ns = float(context.parameter("COM_OF_LOSS_T")) * 1e9
     return context.memory.now_ns - context.memory.offboard.time_ns > limit_ns
 
@@ -99,9 +101,9 @@ def _is_lost(context: AutopilotContext) -> bool:
 def fly(context: AutopilotContext, state: FlightState) -> None:
     """Continues with the newest setpoint; handles the loss of setpoints."""
     setpoint = context.memory.offboard.setpoint
-    if _is_lost(context) or setpoint is None:
+    if _is_stale(context) or setpoint is None:
         action = int(context.parameter("COM_OBL_RC_ACT"))
-        context.say(2, "Failsafe: offboard control lost")
+        context.report(2, "Failsafe: offboard control lost")
         failsafes.act(context, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
         return
     _fly(context, state, setpoint, fresh=False)
@@ -117,7 +119,7 @@ def _fly(
         return
     if not _is_up(context, state, setpoint):
         return
-    if _is_place(setpoint):
+    if _is_position_only(setpoint):
         _go(context, setpoint, fresh=fresh)
     elif _finite(setpoint.position) and _finite(setpoint.velocity):
         _track(context, state, setpoint, fresh=fresh)
@@ -161,7 +163,7 @@ def _is_up(context: AutopilotContext, state: FlightState, setpoint: OffboardSetp
     return True
 
 
-def _is_place(setpoint: OffboardSetpoint) -> bool:
+def _is_position_only(setpoint: OffboardSetpoint) -> bool:
     moves = any(map(math.isfinite, (*setpoint.velocity, *setpoint.acceleration)))
     return _finite(setpoint.position) and not moves and not math.isfinite(setpoint.yaw_rate)
 
@@ -207,10 +209,12 @@ def _steer(
         v + (_GAIN * (goal - here) if math.isfinite(goal) else 0.0)
         for v, goal, here in zip((x, y, z), setpoint.position, state.position, strict=True)
     )
-    size, most = math.hypot(x, y), float(context.parameter("MPC_XY_VEL_MAX"))
-    if size > most:
-        x, y = x * most / size, y * most / size
-    up, down = (float(context.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
+    size, max_speed = math.hypot(x, y), float(context.parameter("MPC_XY_VEL_MAX"))
+    if size > max_speed:
+        x, y = x * max_speed / size, y * max_speed / size
+    up, down = (
+        float(context.parameter(f"MPC_Z_VEL_MAX_{direction}")) for direction in ("UP", "DN")
+    )
     context.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
     mode_transitions.order(context, "steer")
 

@@ -49,7 +49,7 @@ def prepare(context: AutopilotContext, _source: Source, command: Command, height
     before = context.memory.orbit if context.memory.mode is Mode.ORBIT else None
     x, y, z = before.center if before else context.state.position
     if placed:
-        x, y, _ = context.earth.place(latitude, longitude, context.build.origin[2])
+        x, y, _ = context.earth.map_position(latitude, longitude, context.build.origin[2])
     context.memory.orbit = _orbit(
         command.params, before, (x, y, height if math.isfinite(height) else z), context.yaw
     )
@@ -81,18 +81,18 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
     away = math.hypot(x, y)
     if away < 1e-3:
         x, y, away = math.cos(context.yaw), math.sin(context.yaw), 1.0
-        outside = -abs(orbit.radius)
+        radial_error = -abs(orbit.radius)
     else:
-        outside = away - abs(orbit.radius)
+        radial_error = away - abs(orbit.radius)
     outward = x / away, y / away
     if orbit.approaches:
-        orbit.approaches = not _approach(context, orbit, outward, abs(outside) + abs(z))
+        orbit.approaches = not _approach(context, orbit, outward, abs(radial_error) + abs(z))
         return
     if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
         return
     turning = math.copysign(1.0, orbit.radius) * orbit.speed
     along = outward[1] * turning, -outward[0] * turning
-    back = _GAIN * outside
+    back = _GAIN * radial_error
     climb = math.copysign(_climb(context, z), -z)
     yaw, rate = _facing(orbit, outward, turning)
     if orbit.facing == _BY_STICKS and mode_requirements.sticks_are_there(memory):
@@ -146,6 +146,6 @@ def _facing(
 
 def _climb(context: AutopilotContext, above: float) -> float:
     """Returns the speed of the approach to the orbit's height, m/s."""
-    way = "DN" if above > 0.0 else "UP"
-    limit = float(context.parameter(f"MPC_Z_V_AUTO_{way}"))
+    direction = "DN" if above > 0.0 else "UP"
+    limit = float(context.parameter(f"MPC_Z_V_AUTO_{direction}"))
     return min(limit, approach_speed(abs(above), 0.5 * float(context.parameter("MPC_ACC_HOR"))))

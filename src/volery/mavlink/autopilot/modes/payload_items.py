@@ -16,7 +16,7 @@ INTEREST = {_ROI_LOCATION, 196, 197, _ROI_OLD, _ROI_OLDEST}
 """Regions of interest; only `_ROI_LOCATION` has a position."""
 _MISSION_FRAME, _GLOBAL_FRAMES = 2, (0, 3, 5, 6)
 """Values of MAV_FRAME."""
-_MODES_WITH_PLACE, _MODES_WITHOUT = (0, 3), (0, 1, 2)
+_MODES_WITH_POSITION, _MODES_WITHOUT = (0, 3), (0, 1, 2)
 """MAV_ROI of the old commands, in global frames and in that of missions."""
 _ALL = 0b1111111
 _USED = {
@@ -65,20 +65,20 @@ def fault_of(command: int, frame: int, fields: tuple[float, ...]) -> int:
     """
     if frame != _MISSION_FRAME and frame not in _GLOBAL_FRAMES:
         return _BAD_FRAME
-    somewhere = frame != _MISSION_FRAME
+    has_position = frame != _MISSION_FRAME
     old = command in (_ROI_OLD, _ROI_OLDEST)
-    if not old and somewhere != (command == _ROI_LOCATION):
+    if not old and has_position != (command == _ROI_LOCATION):
         return _UNSUPPORTED
     used = _USED[command]
     for k, value in enumerate(fields):
         if not used >> k & 1 and not _is_unset(value):
             return _INVALID_PARAM1 + k
-    modes = _MODES_WITH_PLACE if somewhere else _MODES_WITHOUT
+    modes = _MODES_WITH_POSITION if has_position else _MODES_WITHOUT
     known = not old or (math.isfinite(fields[0]) and int(fields[0]) in modes)
     return _ACCEPTED if known else _INVALID_PARAM1
 
 
-def is_place_of_interest(command: int) -> bool:
+def is_roi_location(command: int) -> bool:
     """Returns whether an item defines a position to face."""
     return command == _ROI_LOCATION
 

@@ -18,22 +18,22 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
     memory = context.memory
     if state.mode == "LANDED" or memory.order == "land":
         return
-    if memory.way_home is None:
-        memory.way_home = ReturnState(goal_of(context), "climb", memory.now_ns)
-        _begin_leg(context, memory.way_home)
+    if memory.return_state is None:
+        memory.return_state = ReturnState(goal_of(context), "climb", memory.now_ns)
+        _begin_leg(context, memory.return_state)
     if memory.leg is not None and not fly_leg(context, memory.leg):
         return
-    way = memory.way_home
-    if way.phase == "wait":
+    progress = memory.return_state
+    if progress.phase == "wait":
         delay_s = float(context.parameter("RTL_LAND_DELAY"))
-        if 0.0 <= delay_s <= (memory.now_ns - way.since_ns) * 1e-9:
+        if 0.0 <= delay_s <= (memory.now_ns - progress.since_ns) * 1e-9:
             memory.leg = None
             mode_transitions.order(context, "land", context.vehicle.land())
         return
-    following = {"climb": "cross", "cross": "descend", "descend": "wait"}[way.phase]
-    memory.way_home = ReturnState(way.goal, following, memory.now_ns)
+    following = {"climb": "cross", "cross": "descend", "descend": "wait"}[progress.phase]
+    memory.return_state = ReturnState(progress.goal, following, memory.now_ns)
     if following != "wait":
-        _begin_leg(context, memory.way_home)
+        _begin_leg(context, memory.return_state)
 
 
 def goal_of(context: AutopilotContext) -> Vector:
@@ -44,15 +44,15 @@ def goal_of(context: AutopilotContext) -> Vector:
     return min(points, key=lambda point: math.dist(point[:2], context.state.position[:2]))
 
 
-def _begin_leg(context: AutopilotContext, way: ReturnState) -> None:
+def _begin_leg(context: AutopilotContext, progress: ReturnState) -> None:
     memory = context.memory
     x, y, z = context.state.position
-    goal, home = way.goal, memory.home_or_origin
-    if way.phase == "climb":
+    goal, home = progress.goal, memory.home_or_origin
+    if progress.phase == "climb":
         far = math.dist(goal[:2], (x, y)) > float(context.parameter("RTL_MIN_DIST"))
         top = max(z, home[2] + float(context.parameter("RTL_RETURN_ALT"))) if far else z
         memory.leg = MissionLeg((x, y, top), None, mode_transitions.cruise(context))
-    elif way.phase == "cross":
+    elif progress.phase == "cross":
         target = (goal[0], goal[1], z if memory.leg is None else memory.leg.target[2])
         memory.leg = MissionLeg(target, bearing(context, target), mode_transitions.cruise(context))
     else:

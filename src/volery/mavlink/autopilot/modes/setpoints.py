@@ -19,7 +19,7 @@ _LOCAL_NED, BODY = 1, (8, 12)
 """MAV_FRAME: LOCAL_NED; BODY_NED and BODY_FRD."""
 GLOBAL = (0, 3, 5, 6)
 """MAV_FRAME: GLOBAL and GLOBAL_RELATIVE_ALT, and both with INT. There are no terrain data."""
-_NO_PLACE, _FORCE, _NO_YAW, _NO_YAW_RATE = 7, 512, 1024, 2048
+_NO_POSITION, _FORCE, _NO_YAW, _NO_YAW_RATE = 7, 512, 1024, 2048
 """Bits of POSITION_TARGET_TYPEMASK."""
 _NO_TILT, _NO_TURN, _BODY_THRUST, _NO_THRUST, _NO_ATTITUDE = 3, 4, 32, 64, 128
 """Bits of ATTITUDE_TARGET_TYPEMASK."""
@@ -66,15 +66,15 @@ def global_setpoint(message: Any, position: Vector) -> OffboardSetpoint:
     A position without one of its components is ignored, as in PX4.
     """
     mask = message.type_mask
-    placed = not mask & _NO_PLACE
+    placed = not mask & _NO_POSITION
     if placed and message.coordinate_frame not in GLOBAL:
         raise CommandError(f"invalid coordinate frame {message.coordinate_frame}")
     if placed and not (abs(message.lat_int) <= 90e7 and abs(message.lon_int) <= 180e7):
         raise CommandError("position is not on the earth")
     velocity = _masked((message.vx, message.vy, message.vz), mask, 3)
     push = _masked((message.afx, message.afy, message.afz), mask, 6)
-    place = position if placed else _NOTHING
-    return _motion(message, place, enu_of_ned(velocity), enu_of_ned(push))
+    target = position if placed else _NOTHING
+    return _motion(message, target, enu_of_ned(velocity), enu_of_ned(push))
 
 
 def _motion(message: Any, position: Vector, velocity: Vector, push: Vector) -> OffboardSetpoint:

@@ -39,7 +39,7 @@ def start(context: AutopilotContext, _source: Source, command: Command) -> int:
     if not any(params):
         if memory.calibration is not None:
             memory.calibration = None
-            context.say(6, "[cal] calibration cancelled")
+            context.report(6, "[cal] calibration cancelled")
         return ACCEPTED
     if memory.armed or memory.calibration is not None or context.state.mode != "LANDED":
         return TEMPORARILY_REJECTED
@@ -56,16 +56,16 @@ def update(context: AutopilotContext) -> None:
     if calibration is None:
         return
     if calibration.percent < 0:
-        context.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
+        context.report(6, f"[cal] calibration started: 2 {calibration.sensor}")
         calibration.percent = 0
     if memory.armed or context.state.mode != "LANDED":
         memory.calibration = None
-        context.say(2, f"[cal] calibration failed: {calibration.sensor}")
+        context.report(2, f"[cal] calibration failed: {calibration.sensor}")
         return
     percent = min((memory.now_ns - calibration.start_ns) * 100 // _DURATION_NS, 100)
     while calibration.percent + _STEP_PERCENT <= percent:
         calibration.percent += _STEP_PERCENT
-        context.say(6, f"[cal] progress <{calibration.percent}>")
+        context.report(6, f"[cal] progress <{calibration.percent}>")
     if calibration.percent == 100:
         memory.calibration = None
-        context.say(6, f"[cal] calibration done: {calibration.sensor}")
+        context.report(6, f"[cal] calibration done: {calibration.sensor}")

@@ -32,7 +32,7 @@ from volery.mavlink.autopilot.safety.geofence import breach
 from volery.mavlink.autopilot.state import Source
 
 DO_SET_MODE = 176
-_FENCE_TELLS = (0, 1)
+_UNRESTRICTED_FENCES = (0, 1)
 """GF_ACTION values of fences that do not restrict flight."""
 _CHANGE_MODE = 1
 """Flag of MAV_DO_REPOSITION_FLAGS."""
@@ -40,7 +40,7 @@ _ABOVE_HOME = (3, 6)
 _GLOBAL_FRAMES = (0, 5, *_ABOVE_HOME)
 _LEVEL_SPEEDS = (0, 1)
 """SPEED_TYPE: air and ground speed, one as the other, as in PX4."""
-_FARTHEST_TAKE_OFF_M = 10_000.0
+_MAX_TAKE_OFF_DISTANCE_M = 10_000.0
 """Distance to which a take-off leads at most (modelling choice)."""
 
 
@@ -57,12 +57,12 @@ def do(context: AutopilotContext, source: Source, command: Command) -> int:
     if context.memory.state is None:
         return TEMPORARILY_REJECTED
     if command.number in _PLACED and not _frame_is_known(command):
-        context.say(4, f"Command {command.number}: frame {command.frame} is not supported")
+        context.report(4, f"Command {command.number}: frame {command.frame} is not supported")
         return UNSUPPORTED_FRAME
     try:
         return handler(context, source, command)
     except CommandError as error:
-        context.say(4, str(error))
+        context.report(4, str(error))
         return TEMPORARILY_REJECTED
 
 
@@ -76,11 +76,11 @@ def _arm(context: AutopilotContext, _source: Source, command: Command) -> int:
     forced = _whole(command.params[1]) == 21196  # PX4's magic number
     wanted = _whole(command.params[0])
     if wanted not in (0, 1):
-        context.say(2, f"Unsupported ARM_DISARM param: {command.params[0]:.3f}")
+        context.report(2, f"Unsupported ARM_DISARM param: {command.params[0]:.3f}")
         return DENIED
     why = arming.arm(context) if wanted else arming.disarm(context, forced=forced)
     if why:
-        context.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
+        context.report(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
 
 
@@ -88,32 +88,35 @@ def _take_off(context: AutopilotContext, _source: Source, command: Command) -> i
     *_, latitude, longitude, altitude = command.params
     if math.isinf(altitude):
         return DENIED
-    height, place = math.nan, None
+    height, position = math.nan, None
     if math.isfinite(altitude):
         height = _height_in_map(context, altitude, command.frame) - context.state.position[2]
         if height <= 0.0:
-            context.say(4, "Take-off altitude is below the vehicle")
+            context.report(4, "Take-off altitude is below the vehicle")
             return DENIED
     if math.isfinite(latitude) and math.isfinite(longitude):
-        place = _place_in_map(context, latitude, longitude)
-        if place is None or math.dist(place, context.state.position[:2]) > _FARTHEST_TAKE_OFF_M:
-            context.say(4, "Take-off position is too far away; nan: above the vehicle")
+        position = _position_in_map(context, latitude, longitude)
+        if (
+            position is None
+            or math.dist(position, context.state.position[:2]) > _MAX_TAKE_OFF_DISTANCE_M
+        ):
+            context.report(4, "Take-off position is too far away; nan: above the vehicle")
             return DENIED
-    context.memory.take_off_height, context.memory.take_off_place = height, place
+    context.memory.take_off_height, context.memory.take_off_position = height, position
     return _switch(context, Mode.TAKE_OFF)
 
 
 def _land(context: AutopilotContext, _source: Source, _command: Command) -> int:
     result = _switch(context, Mode.LAND)
     if result == ACCEPTED:
-        context.say(6, "Landing at current position")
+        context.report(6, "Landing at current position")
     return result
 
 
 def _return(context: AutopilotContext, _source: Source, _command: Command) -> int:
     result = _switch(context, Mode.RETURN)
     if result == ACCEPTED:
-        context.say(6, "Returning to launch")
+        context.report(6, "Returning to launch")
     return result
 
 
@@ -121,7 +124,7 @@ def _set_mode(context: AutopilotContext, _source: Source, command: Command) -> i
     base, main, sub = (_whole(part) for part in command.params[:3])
     mode = mode_of(main, sub) if base & 1 else mode_of_flags(base)
     if mode is None:
-        context.say(4, "This flight mode is not offered")
+        context.report(4, "This flight mode is not offered")
         return UNSUPPORTED
     return _switch(context, mode)
 
@@ -129,15 +132,15 @@ def _set_mode(context: AutopilotContext, _source: Source, command: Command) -> i
 def _set_standard_mode(context: AutopilotContext, _source: Source, command: Command) -> int:
     mode = dialect_extensions.standard_mode(_whole(command.params[0]))
     if mode is None:
-        context.say(4, "This standard mode is not offered")
+        context.report(4, "This standard mode is not offered")
         return FAILED
     return _switch(context, mode)
 
 
 def _switch(context: AutopilotContext, mode: Mode) -> int:
-    why = mode_transitions.ask_for(context, mode)
+    why = mode_transitions.request_mode(context, mode)
     if why:
-        context.say(2, f"Switching to mode '{mode.mavros}' not possible: {why}")
+        context.report(2, f"Switching to mode '{mode.mavros}' not possible: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
 
 
@@ -150,7 +153,7 @@ def _reposition(context: AutopilotContext, _source: Source, command: Command) ->
     if any(math.isinf(param) for param in command.params):
         return DENIED
     if _whole(flags) & ~_CHANGE_MODE:
-        context.say(4, "Reposition with a relative yaw is not supported")
+        context.report(4, "Reposition with a relative yaw is not supported")
         return UNSUPPORTED
     changes_mode = bool(_whole(flags) & _CHANGE_MODE)
     if not mode_transitions.flies(context) or not (
@@ -159,14 +162,16 @@ def _reposition(context: AutopilotContext, _source: Source, command: Command) ->
         return DENIED
     x, y, z = context.state.position
     if math.isfinite(latitude) and math.isfinite(longitude):
-        place = _place_in_map(context, latitude, longitude)
-        if place is None:
+        position = _position_in_map(context, latitude, longitude)
+        if position is None:
             return DENIED
-        x, y = place
+        x, y = position
     if math.isfinite(altitude):
         z = _height_in_map(context, altitude, command.frame)
-    if int(context.parameter("GF_ACTION")) not in _FENCE_TELLS and breach(context, (x, y, z)):
-        context.say(2, "Reposition is outside geofence")
+    if int(context.parameter("GF_ACTION")) not in _UNRESTRICTED_FENCES and breach(
+        context, (x, y, z)
+    ):
+        context.report(2, "Reposition is outside geofence")
         return DENIED
     result = _switch(context, Mode.HOLD)
     if result == ACCEPTED:
@@ -181,7 +186,9 @@ def _orbit(context: AutopilotContext, source: Source, command: Command) -> int:
     # Above sea level in any frame, as in PX4: MAVSDK sends it as relative.
     height = _height_in_map(context, command.params[6], None)
     if math.isfinite(command.params[3]) and command.params[3] != 0.0:
-        context.say(4, "An orbit lasts until the mode changes: a number of turns is not supported")
+        context.report(
+            4, "An orbit lasts until the mode changes: a number of turns is not supported"
+        )
         return DENIED
     result = orbit.prepare(context, source, command, height)
     return _switch(context, Mode.ORBIT) if result == ACCEPTED else result
@@ -193,11 +200,11 @@ def _change_speed(context: AutopilotContext, _source: Source, command: Command) 
     if math.isinf(speed):
         return DENIED
     if _whole(kind) not in _LEVEL_SPEEDS:
-        context.say(4, "Speeds of climb and descent are set by MPC_Z_V_AUTO_UP and _DN")
+        context.report(4, "Speeds of climb and descent are set by MPC_Z_V_AUTO_UP and _DN")
         return DENIED
     if not speed > 0.0:
         if throttle > 0.0:
-            context.say(4, "A multicopter has no cruise throttle")
+            context.report(4, "A multicopter has no cruise throttle")
             return DENIED
         speed = math.nan
     if context.memory.mode is Mode.MISSION:
@@ -219,7 +226,7 @@ def _set_home(context: AutopilotContext, _source: Source, command: Command) -> i
     facing = 0.5 * math.pi - math.radians(yaw) if math.isfinite(yaw) else math.nan
     why = home.choose(context, latitude, longitude, height, facing)
     if why:
-        context.say(4, why)
+        context.report(4, why)
     return DENIED if why else ACCEPTED
 
 
@@ -227,7 +234,7 @@ def _start_mission(context: AutopilotContext, _source: Source, command: Command)
     """Handles MISSION_START: arms, and flies the mission from an item on; -1: current item."""
     why = feasibility.obstacle(context)
     if why:
-        context.say(2, f"Mission start denied: {why}")
+        context.report(2, f"Mission start denied: {why}")
         return DENIED
     first, mission = command.params[0], context.memory.mission
     if not -1.0 <= first < len(context.memory.plans[plans.MISSION]):
@@ -238,12 +245,12 @@ def _start_mission(context: AutopilotContext, _source: Source, command: Command)
         mission_protocol.jump_to(context, int(first))
     last = command.params[1]
     if math.isfinite(last) and 0.0 < last < len(context.memory.plans[plans.MISSION]) - 1:
-        context.say(4, f"The mission flies to its end, not to item {last:.0f}")
+        context.report(4, f"The mission flies to its end, not to item {last:.0f}")
     result = _switch(context, Mode.MISSION)
     if result == ACCEPTED and not context.memory.armed:
         why = arming.arm(context)
         if why:
-            context.say(2, f"Arming denied: {why}")
+            context.report(2, f"Arming denied: {why}")
             return TEMPORARILY_REJECTED
     return result
 
@@ -267,7 +274,7 @@ def _pause(context: AutopilotContext, _source: Source, command: Command) -> int:
 def _check(context: AutopilotContext, _source: Source, _command: Command) -> int:
     """Handles RUN_PREARM_CHECKS: reports all problems that prevent arming."""
     for why in arming.problems(context):
-        context.say(2, f"Preflight Fail: {why}")
+        context.report(2, f"Preflight Fail: {why}")
     return ACCEPTED
 
 
@@ -291,13 +298,13 @@ def _whole(param: float) -> int:
     return round(param) if math.isfinite(param) else 0
 
 
-def _place_in_map(
+def _position_in_map(
     context: AutopilotContext, latitude: float, longitude: float
 ) -> tuple[float, float] | None:
     """Returns x and y in the map, m; None for degrees that are not on the earth."""
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return None
-    x, y, _ = context.earth.place(latitude, longitude, context.build.origin[2])
+    x, y, _ = context.earth.map_position(latitude, longitude, context.build.origin[2])
     return x, y
 
 

@@ -44,7 +44,7 @@ def inject(context: AutopilotContext, _source: Source, command: Command) -> int:
     for number in instances:
         why = _change(context, (unit, number), _fault_of(unit, kind, number))
         if why:
-            context.say(4, why)
+            context.report(4, why)
             return FAILED
     return ACCEPTED
 

@@ -15,7 +15,7 @@ from volery.mavlink.codec import dialect
 _HEADER = struct.Struct("<HBBBBBBI")
 """Sequence, session, opcode, size, answered opcode, end of a burst, padding, offset."""
 _PAYLOAD = 251
-_MOST_DATA = _PAYLOAD - _HEADER.size
+_MAX_DATA_BYTES = _PAYLOAD - _HEADER.size
 _ACK, _NAK = 128, 129
 _FAIL, _INVALID_SIZE, _INVALID_SESSION, _UNKNOWN_COMMAND, _NOT_FOUND = 1, 3, 4, 7, 10
 _FAULTS = {
@@ -31,9 +31,11 @@ def answer_file_request(context: AutopilotContext, source: Source, message: Any)
     """Answers a FILE_TRANSFER_PROTOCOL message."""
     payload = bytes(message.payload)
     sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
-    fault = _INVALID_SIZE if size > _MOST_DATA else _FAULTS.get(opcode, _UNKNOWN_COMMAND)
+    fault = _INVALID_SIZE if size > _MAX_DATA_BYTES else _FAULTS.get(opcode, _UNKNOWN_COMMAND)
     kind, data = (_NAK, bytes((fault,))) if fault else (_ACK, b"")
     head = _HEADER.pack(sequence + 1 & 0xFFFF, session, kind, len(data), opcode, 0, 0, offset)
     link, system, component = source
-    answer = dialect().MAVLink_file_transfer_protocol_message
-    context.links.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)
+    message_class = dialect().MAVLink_file_transfer_protocol_message
+    context.links.send(
+        message_class(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link
+    )

@@ -11,7 +11,7 @@ def item_position(context: AutopilotContext, item: plans.MissionItem) -> Vector:
     """Returns an item's position in the map, m; above home or sea level according to its frame."""
     x, y, _ = context.state.position
     if item.placed:
-        x, y, _ = context.earth.place(item.latitude, item.longitude, context.build.origin[2])
+        x, y, _ = context.earth.map_position(item.latitude, item.longitude, context.build.origin[2])
     base = context.memory.home_or_origin
     above = item.frame in plans.ABOVE_HOME
     z = item.altitude + (base[2] if above else -context.build.origin[2])

@@ -45,16 +45,16 @@ class TransferRate:
     def __init__(self) -> None:
         self._now_ns = -1
         self._num_sending = 0
-        self._share = FRAMES_PER_STATE
+        self._quota = FRAMES_PER_STATE
 
-    def share(self, now_ns: int) -> int:
+    def quota(self, now_ns: int) -> int:
         """Returns how many frames a vehicle with data may send at a time."""
         if now_ns != self._now_ns:
             self._now_ns = now_ns
-            self._share = max(1, FRAMES_PER_STATE // max(1, self._num_sending))
+            self._quota = max(1, FRAMES_PER_STATE // max(1, self._num_sending))
             self._num_sending = 0
         self._num_sending += 1
-        return self._share
+        return self._quota
 
 
 class LogTransfers:
@@ -97,7 +97,7 @@ class LogTransfers:
 
     def send_some(self, now_ns: int) -> None:
         """Continues the answers, the links in turn."""
-        num_frames = self.pace.share(now_ns) if self._waiting else 0
+        num_frames = self.pace.quota(now_ns) if self._waiting else 0
         while num_frames > 0 and self._waiting:
             link = self._waiting.popleft()
             request, turn = self._requests[link], min(num_frames, _FRAMES_PER_TURN)

@@ -28,26 +28,26 @@ _UNSET, _UNSET_AS_FLOAT, _NAN_AS_INTEGER = 2**31 - 1, 2.0**31, 0x7FF80000
 
 def _heartbeat(context: AutopilotContext, _source: Source, message: Any) -> None:
     if message.type == _GROUND_STATION:
-        context.memory.ground_heard_ns = context.memory.now_ns
+        context.memory.ground_heartbeat_ns = context.memory.now_ns
 
 
 def _ping(context: AutopilotContext, source: Source, message: Any) -> None:
     if message.target_system == 0 and message.target_component == 0:
         link, system, component = source
-        answer = dialect().MAVLink_ping_message(message.time_usec, message.seq, system, component)
-        context.links.send(answer, link)
+        response = dialect().MAVLink_ping_message(message.time_usec, message.seq, system, component)
+        context.links.send(response, link)
 
 
 def _time_sync(context: AutopilotContext, source: Source, message: Any) -> None:
     """Answers with the simulated time since the start."""
     if message.tc1 == 0:
-        answer = dialect().MAVLink_timesync_message(context.memory.now_ns, message.ts1)
-        context.links.send(answer, source[0])
+        response = dialect().MAVLink_timesync_message(context.memory.now_ns, message.ts1)
+        context.links.send(response, source[0])
 
 
 def _deny(context: AutopilotContext, source: Source, message: Any, why: str) -> None:
     """Denies a command whose position has the other message's value for "unset", as PX4 does."""
-    context.say(4, f"Command {message.command} denied: {why}")
+    context.report(4, f"Command {message.command} denied: {why}")
     acknowledge(context.links, source, message.command, DENIED)
 
 
@@ -85,7 +85,7 @@ def _refuse(context: AutopilotContext, _source: Source, message: Any) -> None:
     kind = message.get_type()
     if kind not in context.memory.refused_messages:
         context.memory.refused_messages.add(kind)
-        context.say(4, f"{kind} is not supported and ignored")
+        context.report(4, f"{kind} is not supported and ignored")
 
 
 _REFUSED = (

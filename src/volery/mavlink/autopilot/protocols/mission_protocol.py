@@ -26,15 +26,15 @@ GIVE_UP_NS = 5_000_000_000
 def begin_upload(context: AutopilotContext, source: Source, message: Any) -> None:
     """Answers MISSION_COUNT by a request for the first item."""
     kind, count = int(message.mission_type), int(message.count)
-    if kind not in plans.MOST_ITEMS:
-        _answer(context, source, plans.UNSUPPORTED, kind)
+    if kind not in plans.MAX_ITEMS:
+        _acknowledge(context, source, plans.UNSUPPORTED, kind)
         return
     running = context.memory.transfers.get(kind)
     if running is not None and running.source != source and running.upload:
-        _answer(context, source, plans.DENIED, kind)
+        _acknowledge(context, source, plans.DENIED, kind)
         return
-    if count > plans.MOST_ITEMS[kind]:
-        _answer(context, source, plans.NO_SPACE, kind)
+    if count > plans.MAX_ITEMS[kind]:
+        _acknowledge(context, source, plans.NO_SPACE, kind)
         return
     now_ns = context.memory.now_ns
     transfer = MissionTransfer(kind, source, True, count, time_ns=now_ns)
@@ -43,7 +43,7 @@ def begin_upload(context: AutopilotContext, source: Source, message: Any) -> Non
         return
     context.memory.transfers[kind] = transfer
     context.memory.last_items.pop(kind, None)
-    _ask(context, transfer)
+    _request_item(context, transfer)
 
 
 def take_item(context: AutopilotContext, source: Source, message: Any) -> None:
@@ -51,9 +51,9 @@ def take_item(context: AutopilotContext, source: Source, message: Any) -> None:
     kind, sequence = int(message.mission_type), int(message.seq)
     transfer = context.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
-        if transfer is None and kind in plans.MOST_ITEMS:
+        if transfer is None and kind in plans.MAX_ITEMS:
             repeated = context.memory.last_items.get(kind) == (source, sequence)
-            _answer(context, source, plans.ACCEPTED if repeated else plans.ERROR, kind)
+            _acknowledge(context, source, plans.ACCEPTED if repeated else plans.ERROR, kind)
         return
     transfer.time_ns = context.memory.now_ns
     if sequence != len(transfer.items):
@@ -67,11 +67,11 @@ def take_item(context: AutopilotContext, source: Source, message: Any) -> None:
     if int(message.current) == 1:
         transfer.first = sequence
     if len(transfer.items) < transfer.count:
-        _ask(context, transfer)
+        _request_item(context, transfer)
     elif kind == plans.FENCE and not plans.polygons_are_whole(transfer.items):
         _end(context, transfer, plans.INVALID)
     elif kind == plans.MISSION and plans.flies_for_ever(transfer.items):
-        context.say(2, "Mission rejected: its jumps go round for ever")
+        context.report(2, "Mission rejected: its jumps go round for ever")
         _end(context, transfer, plans.INVALID)
     else:
         _take_over(context, transfer)
@@ -80,8 +80,8 @@ def take_item(context: AutopilotContext, source: Source, message: Any) -> None:
 def begin_download(context: AutopilotContext, source: Source, message: Any) -> None:
     """Answers MISSION_REQUEST_LIST with the number of items."""
     kind = int(message.mission_type)
-    if kind not in plans.MOST_ITEMS:
-        _answer(context, source, plans.UNSUPPORTED, kind)
+    if kind not in plans.MAX_ITEMS:
+        _acknowledge(context, source, plans.UNSUPPORTED, kind)
         return
     link, system, component = source
     count = len(context.memory.plans[kind])
@@ -95,17 +95,17 @@ def send_item(context: AutopilotContext, source: Source, message: Any) -> None:
     kind, sequence = int(message.mission_type), int(message.seq)
     items = context.memory.plans.get(kind)
     if items is None or sequence >= len(items):
-        _answer(context, source, plans.INVALID_SEQUENCE, kind)
+        _acknowledge(context, source, plans.INVALID_SEQUENCE, kind)
         return
     link, system, component = source
     item, current = items[sequence], kind == 0 and sequence == context.memory.mission.current
     whole = message.get_type() == "MISSION_REQUEST_INT"
     name = "mission_item_int" if whole else "mission_item"
-    places = (item.latitude, item.longitude)
+    degrees = (item.latitude, item.longitude)
     if whole:
-        x, y = (-(2**31) if part != part else round(part * 1e7) for part in places)  # noqa: PLR0124
+        x, y = (-(2**31) if part != part else round(part * 1e7) for part in degrees)  # noqa: PLR0124
     else:
-        x, y = places  # type: ignore[assignment]
+        x, y = degrees  # type: ignore[assignment]
     message_class = getattr(dialect(), f"MAVLink_{name}_message")
     head = (system, component, sequence, item.frame, item.command, int(current), int(item.goes_on))
     context.links.send(message_class(*head, *item.params, x, y, item.altitude, kind), link)
@@ -124,26 +124,26 @@ def take_ack(context: AutopilotContext, source: Source, message: Any) -> None:
 def clear(context: AutopilotContext, source: Source, message: Any) -> None:
     """Deletes one plan or all plans."""
     kind = int(message.mission_type)
-    kinds = tuple(plans.MOST_ITEMS) if kind == plans.ALL else (kind,)
-    if not set(kinds) <= set(plans.MOST_ITEMS):
-        _answer(context, source, plans.UNSUPPORTED, kind)
+    kinds = tuple(plans.MAX_ITEMS) if kind == plans.ALL else (kind,)
+    if not set(kinds) <= set(plans.MAX_ITEMS):
+        _acknowledge(context, source, plans.UNSUPPORTED, kind)
         return
     for one in kinds:
         context.memory.transfers.pop(one, None)
         _replace(context, one, [])
-    _answer(context, source, plans.ACCEPTED, kind)
+    _acknowledge(context, source, plans.ACCEPTED, kind)
 
 
 def set_current(context: AutopilotContext, _source: Source, message: Any) -> None:
     """Handles the old MISSION_SET_CURRENT, which has no answer: PX4 says why it fails."""
     if not jump_to(context, int(message.seq), resets=False):
-        context.say(2, "WPM: WP CURR CMD: Not in list")
+        context.report(2, "WPM: WP CURR CMD: Not in list")
 
 
 def jump_to(context: AutopilotContext, sequence: int, *, resets: bool = True) -> bool:
     """Makes an item the current one and announces it; returns whether the item exists.
 
-    resets: whether jumps start to count anew.
+    resets: whether the counts of jumps start at zero.
     """
     if not 0 <= sequence < len(context.memory.plans[plans.MISSION]):
         return False
@@ -155,26 +155,26 @@ def jump_to(context: AutopilotContext, sequence: int, *, resets: bool = True) ->
     return True
 
 
-def keep_transfers_going(context: AutopilotContext) -> None:
+def update_transfers(context: AutopilotContext) -> None:
     """Repeats unanswered requests and drops silent peers."""
     now_ns = context.memory.now_ns
     for transfer in tuple(context.memory.transfers.values()):
         if now_ns - transfer.time_ns > GIVE_UP_NS:
             _end(context, transfer, plans.CANCELLED)
-        elif now_ns - transfer.asked_ns > RETRY_NS:
-            _ask(context, transfer)
+        elif now_ns - transfer.requested_ns > RETRY_NS:
+            _request_item(context, transfer)
 
 
-def _ask(context: AutopilotContext, transfer: MissionTransfer) -> None:
+def _request_item(context: AutopilotContext, transfer: MissionTransfer) -> None:
     link, system, component = transfer.source
-    transfer.asked_ns = context.memory.now_ns
+    transfer.requested_ns = context.memory.now_ns
     request = dialect().MAVLink_mission_request_int_message
     context.links.send(request(system, component, len(transfer.items), transfer.kind), link)
 
 
 def _end(context: AutopilotContext, transfer: MissionTransfer, result: int) -> None:
     context.memory.transfers.pop(transfer.kind, None)
-    _answer(context, transfer.source, result, transfer.kind)
+    _acknowledge(context, transfer.source, result, transfer.kind)
 
 
 def _take_over(context: AutopilotContext, transfer: MissionTransfer) -> None:
@@ -195,7 +195,7 @@ def _check_plans(context: AutopilotContext) -> None:
     if not why:
         _warn_of_far_start(context)
         return
-    context.say(2, why)
+    context.report(2, why)
     if context.memory.mode is Mode.MISSION and context.memory.armed:
         mode_transitions.enter(context, Mode.HOLD)
 
@@ -210,7 +210,9 @@ def _warn_of_far_start(context: AutopilotContext) -> None:
     home = context.memory.home_or_origin
     away = math.dist(item_position(context, first)[:2], home[:2])
     if away >= limit:
-        context.say(2, f"First waypoint far away from home: {away:.0f}m. Correct mission loaded?")
+        context.report(
+            2, f"First waypoint far away from home: {away:.0f}m. Correct mission loaded?"
+        )
 
 
 def _replace(context: AutopilotContext, kind: int, items: list[plans.MissionItem]) -> None:
@@ -220,6 +222,6 @@ def _replace(context: AutopilotContext, kind: int, items: list[plans.MissionItem
         context.memory.leg = None
 
 
-def _answer(context: AutopilotContext, source: Source, result: int, kind: int) -> None:
+def _acknowledge(context: AutopilotContext, source: Source, result: int, kind: int) -> None:
     link, system, component = source
     context.links.send(dialect().MAVLink_mission_ack_message(system, component, result, kind), link)

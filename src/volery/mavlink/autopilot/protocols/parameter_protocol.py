@@ -36,7 +36,7 @@ def send_list(context: AutopilotContext, source: Source, _message: Any) -> None:
 def send_some(context: AutopilotContext, link: LinkState) -> None:
     """Continues a list."""
     for _ in range(min(A_TICK, len(link.parameters_to_send))):
-        _tell(context, link.number, NAMES[link.parameters_to_send.pop()])
+        _send_value(context, link.number, NAMES[link.parameters_to_send.pop()])
 
 
 def send_one(context: AutopilotContext, source: Source, message: Any) -> None:
@@ -47,7 +47,7 @@ def send_one(context: AutopilotContext, source: Source, message: Any) -> None:
     if index < 0 and name == CHECK:
         _send_check(context, source[0])
     elif index < len(NAMES) and name in DEFAULTS:
-        _tell(context, source[0], name)
+        _send_value(context, source[0], name)
     else:
         _send_fault(context, source, "" if index >= 0 else name, _DOES_NOT_EXIST, index)
 
@@ -63,7 +63,7 @@ def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
         _send_fault(context, source, name, _READ_ONLY)
         return
     if name not in DEFAULTS:
-        context.say(4, f"unknown param: {name}")
+        context.report(4, f"unknown param: {name}")
         _send_fault(context, source, name, _DOES_NOT_EXIST)
         return
     value = from_wire(message.param_type, message.param_value)
@@ -73,14 +73,14 @@ def set_one(context: AutopilotContext, source: Source, message: Any) -> None:
     elif value is None or (why := refusal(name, value)):
         fault = _READ_ONLY if DEFAULTS[name].fixed else _OUT_OF_RANGE
     if fault or value is None:
-        context.say(4, why)
+        context.report(4, why)
         _send_fault(context, source, name, fault)
-        _tell(context, source[0], name)
+        _send_value(context, source[0], name)
         return
     context.memory.parameters[name] = value
     context.log.note_parameter(name, value)
     for number in context.links.open:
-        _tell(context, number, name)
+        _send_value(context, number, name)
 
 
 def _send_fault(
@@ -101,7 +101,7 @@ def _send_check(context: AutopilotContext, link: int) -> None:
     )
 
 
-def _tell(context: AutopilotContext, link: int, name: str) -> None:
+def _send_value(context: AutopilotContext, link: int, name: str) -> None:
     value = on_wire(name, context.memory.parameters[name])
     message = dialect().MAVLink_param_value_message(
         name.encode(), value, type_of(name), len(NAMES), NAMES.index(name)

@@ -9,7 +9,7 @@ from volery.mavlink.autopilot.modes import payload_items
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 """Values of MAV_MISSION_TYPE."""
-MOST_ITEMS = {MISSION: 500, FENCE: 200, RALLY: 50}
+MAX_ITEMS = {MISSION: 500, FENCE: 200, RALLY: 50}
 """Largest numbers of items (modelling choice), similar to PX4 on a flight controller."""
 
 WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE = 16, 17, 19, 31
@@ -29,7 +29,7 @@ _KNOWN = {
     FENCE: {RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT},
     RALLY: {RALLY_POINT},
 }
-NEED_NO_PLACE = {
+NEED_NO_POSITION = {
     DELAY,
     CONDITION_DELAY,
     CONDITION_YAW,
@@ -107,7 +107,7 @@ def fault_of(item: MissionItem, kind: int, count: int) -> int:  # noqa: PLR0911
         return _fault_of_turn(item)
     if kind == MISSION and item.command not in (*PLACED, SET_HOME):
         return ACCEPTED
-    return _fault_of_place(item, kind)
+    return _fault_of_position(item, kind)
 
 
 def _fault_of_turn(item: MissionItem) -> int:
@@ -122,7 +122,7 @@ def _fault_of_turn(item: MissionItem) -> int:
     return ACCEPTED if known else INVALID_PARAM1 + 3
 
 
-def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
+def _fault_of_position(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
     if item.frame not in (*AMSL, *ABOVE_HOME, *(MISSION_FRAME if kind != MISSION else ())):
         return BAD_FRAME
     if kind != MISSION or item.placed:
@@ -135,7 +135,7 @@ def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
     circle = item.command in (CIRCLE_IN, CIRCLE_OUT)
     if circle and not item.params[0] >= 0.0:  # PX4 accepts 0, which contains nothing
         return INVALID_PARAM1
-    if item.command in (POLYGON_IN, POLYGON_OUT) and not 3 <= item.params[0] <= MOST_ITEMS[FENCE]:
+    if item.command in (POLYGON_IN, POLYGON_OUT) and not 3 <= item.params[0] <= MAX_ITEMS[FENCE]:
         return INVALID_PARAM1
     return ACCEPTED
 

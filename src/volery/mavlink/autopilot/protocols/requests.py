@@ -14,7 +14,7 @@ from volery.mavlink.autopilot.messages import dialect_extensions, streams, telem
 from volery.mavlink.autopilot.protocols.command_protocol import ACCEPTED, DENIED, FAILED, Command
 from volery.mavlink.autopilot.state import Source
 
-_EVERYONE, _TARGETS = 2, (0, 1, 2)
+_BROADCAST, _TARGETS = 2, (0, 1, 2)
 """Receivers of a requested message: as usual or the requester, both over its link; everyone."""
 FOR_ALL = (519, 520)
 """MAV_CMD that PX4 executes if they are for all systems and whatever their component."""
@@ -30,7 +30,9 @@ def set_interval(context: AutopilotContext, source: Source, command: Command) ->
     if any(math.isfinite(unused) and round(unused) for unused in (third, fourth, target)):
         return FAILED
     link = context.links.open.get(source[0])  # MAVROS's topics come over no link
-    if link is None or not streams.ask_for(link, round(number), period_us, context.memory.now_ns):
+    if link is None or not streams.set_period(
+        link, round(number), period_us, context.memory.now_ns
+    ):
         return FAILED
     return ACCEPTED
 
@@ -46,7 +48,7 @@ def send(context: AutopilotContext, source: Source, command: Command) -> int:
     whom = round(target) if math.isfinite(target) else 0
     if not math.isfinite(number) or whom not in _TARGETS:
         return DENIED
-    if whom == _EVERYONE:
+    if whom == _BROADCAST:
         source = (ALL_LINKS, *source[1:])
     if round(number) == telemetry.MESSAGE_INTERVAL:
         return _send_interval(context, source, what)

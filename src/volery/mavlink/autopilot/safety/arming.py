@@ -61,7 +61,7 @@ def arm(context: AutopilotContext) -> str:
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()
     home.set_on_arming(context)
-    context.say(6, "Armed by external command")
+    context.report(6, "Armed by external command")
     context.announce()
     return ""
 
@@ -91,8 +91,8 @@ def finish(context: AutopilotContext, text: str) -> None:
     if not memory.armed:
         return
     memory.armed, memory.airborne, memory.failsafe = False, False, False
-    memory.leg = memory.way_home = memory.target = None
+    memory.leg = memory.return_state = memory.target = None
     if memory.mode in (Mode.RETURN, Mode.LAND, Mode.TAKE_OFF, Mode.OFFBOARD):
         memory.mode = Mode.HOLD
-    context.say(6, text)
+    context.report(6, text)
     context.announce()

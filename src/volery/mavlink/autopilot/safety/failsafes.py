@@ -14,14 +14,14 @@ from volery.mavlink.autopilot.vehicle import FlightState
 
 PERIOD_NS = 100_000_000
 """Time between two checks (modelling choice)."""
-_FIX_PATIENCE_NS = 5_000_000_000
+_FIX_TIMEOUT_NS = 5_000_000_000
 """Time without a fix after which the estimate is invalid, PX4's EKF2_NOAID_TOUT."""
 
 
 def check(context: AutopilotContext, state: FlightState) -> None:
     """Checks for problems; reports each problem once and acts on it once."""
     memory = context.memory
-    memory.fix_lost = memory.now_ns - memory.fix_ns > _FIX_PATIENCE_NS
+    memory.fix_lost = memory.now_ns - memory.fix_ns > _FIX_TIMEOUT_NS
     flies = memory.armed and mode_transitions.flies(context)
     for name, look in _LOOKS.items():
         found = look(context, state) if flies or name.startswith("battery") else None
@@ -30,7 +30,7 @@ def check(context: AutopilotContext, state: FlightState) -> None:
         elif name not in memory.warned:
             memory.warned.add(name)
             text, mode = found
-            context.say(2 if mode else 4, text)
+            context.report(2 if mode else 4, text)
             if flies:
                 act(context, mode)
 
@@ -48,11 +48,11 @@ def act(context: AutopilotContext, mode: Mode | None) -> None:
     if memory.mode is Mode.LAND or (memory.mode is Mode.RETURN and mode is Mode.HOLD):
         return
     memory.failsafe = True
-    if mode is not memory.mode or (mode is Mode.HOLD and _is_under_way(context)):
+    if mode is not memory.mode or (mode is Mode.HOLD and _flies_to_position(context)):
         mode_transitions.enter(context, mode)
 
 
-def _is_under_way(context: AutopilotContext) -> bool:
+def _flies_to_position(context: AutopilotContext) -> bool:
     """Returns whether a UAV in hold flies to a position.
 
     The cause is a reposition or another client's command.

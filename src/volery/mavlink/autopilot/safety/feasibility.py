@@ -37,7 +37,7 @@ def _problem_of_take_off(context: AutopilotContext, items: list[plans.MissionIte
                 return "Mission rejected: Takeoff altitude below home altitude!"
             if placed:
                 return "Mission rejected: takeoff not first waypoint item"
-        placed = placed or item.command not in plans.NEED_NO_PLACE
+        placed = placed or item.command not in plans.NEED_NO_POSITION
     return ""
 
 

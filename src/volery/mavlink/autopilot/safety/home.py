@@ -10,7 +10,7 @@ from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.messages import motion
 from volery.mavlink.codec import dialect
 
-_FARTHEST_M, _HIGHEST_M = 1e6, 1e5
+_MAX_DISTANCE_M, _MAX_HEIGHT_M = 1e6, 1e5
 """Limits from the map's origin, beyond which a flat map is invalid (modelling choice; PX4 has
 none)."""
 
@@ -38,10 +38,10 @@ def choose(
     origin = context.build.origin
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return "Home is not on the earth"
-    place = context.earth.place(latitude, longitude, origin[2])
-    if not (math.hypot(*place) <= _FARTHEST_M and abs(z) <= _HIGHEST_M):
+    position = context.earth.map_position(latitude, longitude, origin[2])
+    if not (math.hypot(*position) <= _MAX_DISTANCE_M and abs(z) <= _MAX_HEIGHT_M):
         return "Home is too far away"
-    context.memory.home = (place[0], place[1], z)
+    context.memory.home = (position[0], position[1], z)
     context.memory.chosen_home = (latitude, longitude, z + origin[2])
     context.memory.home_yaw = yaw
     context.links.send(position_message(context))
@@ -54,10 +54,10 @@ def position_message(context: AutopilotContext) -> Any:
     if home is None:
         return None
     origin = context.memory.origin
-    place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
+    offset = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
     return dialect().MAVLink_home_position_message(
         *motion.degrees_e7(context.memory.chosen_home or context.earth.geodetic(home)),
-        *ned_of_enu(place),
+        *ned_of_enu(offset),
         _heading(context.memory.home_yaw),
         *(math.nan,) * 3,
         motion.us(context),

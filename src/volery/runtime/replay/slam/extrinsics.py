@@ -99,8 +99,8 @@ def _join_moving(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[st
                 and not _is_body(child)
                 and np.isfinite([p.x, p.y, p.z]).all()
             ):
-                place = Mount(np.array([p.x, p.y, p.z]), rotations.IDENTITY)
-                both.joints[child] = frame_of(found), place
+                mount = Mount(np.array([p.x, p.y, p.z]), rotations.IDENTITY)
+                both.joints[child] = frame_of(found), mount
         if all(_is_in_body(both, frame) for frame in frames):
             break
     for frame in frames:

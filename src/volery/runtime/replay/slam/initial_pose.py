@@ -9,7 +9,7 @@ from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError
 from volery.graph.messages import frame_of
-from volery.runtime.construction.fleet import place
+from volery.runtime.construction.fleet import place_fleet
 from volery.runtime.construction.worlds import build_world
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.replay.slam.extrinsics import ExtrinsicsLog
@@ -58,7 +58,7 @@ def _scenario_pose(source: ExtrinsicsLog, uav: str) -> Pose | None:
             )
             terrain, _, _, scene = build_world(scenario, 1)
             with closing(scene):
-                starts = place(scenario, scene, terrain)
+                starts = place_fleet(scenario, scene, terrain)
         except VoleryError:  # of another version, or its files are elsewhere
             return None
         for start in starts:

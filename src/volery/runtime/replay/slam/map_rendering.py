@@ -17,10 +17,10 @@ from volery.graph.messages import LaserScan, frame_of, stamp_of
 from volery.runtime.replay.slam.offline_slam import SlamResult
 from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
 
-_NEAREST_M = 0.05
+_MIN_RANGE_M = 0.05
 _MARGIN_M = 1.0
-_MOST_CELLS = 100_000_000
-_COARSEST_M = 2.0
+_MAX_CELLS = 100_000_000
+_MAX_CELL_M = 2.0
 """Max cell width, m; a map that needs larger cells comes from a diverged trajectory."""
 _SLAB_M = 0.5
 """Max height difference between a return and a tilted scanner, m; beyond it the return is of
@@ -29,19 +29,19 @@ other objects: ground, branches."""
 
 _OVER_GROUND_M = 0.6
 """Max height above ground of returns that may be of the ground, m."""
-_EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
+_EVERY, _MIN_GROUND_RANGE_M, _MAX_GROUND_RANGE_M = 4, 0.6, 20.0
 """Beams of the nodding LIDAR that measure the ground: each fourth, between these ranges, m."""
 
 
-def draw_map(outcome: SlamResult, cell_m: float, reach_m: float) -> LogOddsGrid:
-    """Returns the occupancy grid of a run; returns beyond `reach_m` are free space up to there.
+def draw_map(outcome: SlamResult, cell_m: float, max_range_m: float) -> LogOddsGrid:
+    """Returns the occupancy grid of a run; returns beyond `max_range_m` are free space up to there.
 
     Cells are `cell_m` wide, doubled as often as the memory limit requires. Raises
     `RecordingError` if that makes them too coarse.
     """
     ground = _ground(outcome)
     rays = [
-        _rays(outcome.trajectory, row, scan, outcome.mount(frame_of(scan)), reach_m, ground)
+        _rays(outcome.trajectory, row, scan, outcome.mount(frame_of(scan)), max_range_m, ground)
         for row, scan in outcome.scans
     ]
     ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
@@ -59,8 +59,8 @@ def fitting_cell(size: Array, cell_m: float) -> float:
     Raises `RecordingError` if none fits.
     """
     wished = cell_m
-    while np.isfinite(size).all() and cell_m <= max(_COARSEST_M, wished):
-        if float(np.prod(size / cell_m)) <= _MOST_CELLS:
+    while np.isfinite(size).all() and cell_m <= max(_MAX_CELL_M, wished):
+        if float(np.prod(size / cell_m)) <= _MAX_CELLS:
             return cell_m
         cell_m *= 2.0
     raise RecordingError(
@@ -73,20 +73,22 @@ def _rays(
     row: int,
     scan: LaserScan,
     mount: Mount,
-    reach_m: float,
+    max_range_m: float,
     ground: VerticalStructures | None,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Returns starts and ends (K, 2), m, of a scan's rays in the map, and whether they hit."""
     ranges = np.asarray(scan.ranges, np.float64)
-    nearest = max(_NEAREST_M, float(scan.range_min))
-    most = float(scan.range_max)
-    rows = np.flatnonzero((ranges >= nearest) & (ranges <= (most if most > 0.0 else math.inf)))
-    length = np.minimum(ranges[rows], reach_m)
-    hits = ranges[rows] <= reach_m
+    range_min = max(_MIN_RANGE_M, float(scan.range_min))
+    range_max = float(scan.range_max)
+    rows = np.flatnonzero(
+        (ranges >= range_min) & (ranges <= (range_max if range_max > 0.0 else math.inf))
+    )
+    length = np.minimum(ranges[rows], max_range_m)
+    hits = ranges[rows] <= max_range_m
     angle = float(scan.angle_min) + rows * float(scan.angle_increment)
     flat = np.stack([length * np.cos(angle), length * np.sin(angle), np.zeros(len(rows))], axis=1)
-    place, turn = _poses(trajectory, row, scan, rows)
-    starts = rotations.rotate(turn, mount.position) + place
+    position, turn = _poses(trajectory, row, scan, rows)
+    starts = rotations.rotate(turn, mount.position) + position
     ends = rotations.rotate(rotations.multiply(turn, mount.attitude), flat) + starts
     rise = np.abs(ends[:, 2] - starts[:, 2])
     short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
@@ -104,7 +106,7 @@ def _ground(outcome: SlamResult) -> VerticalStructures | None:
     found = [np.zeros((0, 3))]
     for row, scan in outcome.nodding:
         ranges = np.asarray(scan.ranges, np.float64)[::_EVERY]
-        near = (ranges > _NEAREST_GROUND_M) & (ranges < _FARTHEST_GROUND_M)
+        near = (ranges > _MIN_GROUND_RANGE_M) & (ranges < _MAX_GROUND_RANGE_M)
         length, beams = ranges[near], np.flatnonzero(near) * _EVERY
         when = stamp_of(scan) * 1e-9 + beams * float(scan.time_increment)
         nod = np.interp(when, outcome.nods[:, 0], outcome.nods[:, 1])
@@ -113,8 +115,8 @@ def _ground(outcome: SlamResult) -> VerticalStructures | None:
         along = np.stack([np.cos(nod) * x, y, -np.sin(nod) * x], axis=1)
         mount = outcome.mount(frame_of(scan))
         body = rotations.rotate(mount.attitude, along) + mount.position
-        place, turn = _poses(outcome.trajectory, row, scan, beams)
-        found.append(rotations.rotate(turn, body) + place)
+        position, turn = _poses(outcome.trajectory, row, scan, beams)
+        found.append(rotations.rotate(turn, body) + position)
     return VerticalStructures(np.concatenate(found))
 
 
@@ -129,8 +131,10 @@ def _poses(
     before = after - 1
     after = np.minimum(after, len(clock) - 1)
     span = np.maximum(clock[after] - clock[before], 1)
-    share = np.clip((when - clock[before]) / span, 0.0, 1.0)[:, None]
-    place = trajectory.position[before] * (1.0 - share) + trajectory.position[after] * share
+    fraction = np.clip((when - clock[before]) / span, 0.0, 1.0)[:, None]
+    position = (
+        trajectory.position[before] * (1.0 - fraction) + trajectory.position[after] * fraction
+    )
     one, other = trajectory.attitude[before], trajectory.attitude[after]
     sign = np.where((one * other).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    return place, rotations.normalize((1.0 - share) * one + share * sign * other)
+    return position, rotations.normalize((1.0 - fraction) * one + fraction * sign * other)

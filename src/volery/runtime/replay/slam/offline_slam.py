@@ -28,7 +28,7 @@ from volery.runtime.replay.slam.topic_selection import (
     TopicSelection,
     choose,
 )
-from volery.runtime.replay.slam.trajectory import EstimatedTrajectory, corrected, way_m
+from volery.runtime.replay.slam.trajectory import EstimatedTrajectory, corrected, path_length_m
 from volery.runtime.warmup.parallel_compilation import compile_all
 
 _JOINT = "laser_nodding"
@@ -37,7 +37,7 @@ _APART_M, _APART_RAD = 0.25, 0.2
 _NODDING_NS = 175_000_000
 """Time between nodding scans that measure the ground, ns; 1 s is no multiple of it."""
 _PROGRESS_S = 0.5
-_PATIENCE_S = 60.0
+_TIMEOUT_S = 60.0
 """Max simulated time to wait for the final path, s; the first path is that of the log's end."""
 
 
@@ -45,12 +45,12 @@ _PATIENCE_S = 60.0
 class SlamOptions:
     """Options of a run besides the log."""
 
-    asked: RequestedTopics = field(default_factory=RequestedTopics)
+    requested_topics: RequestedTopics = field(default_factory=RequestedTopics)
     start: tuple[float, float, float, float] | None = None
     """x, y, z in m and yaw in rad; None: from the log if Volery recorded it, else the origin."""
     level_mount: tuple[float, float, float] | None = None
     nodding_mount: tuple[float, float, float] | None = None
-    reach_m: float = 30.0
+    max_range_m: float = 30.0
     loop_closures: bool = True
 
 
@@ -89,7 +89,7 @@ class OfflineSlam:
 
     def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
         self._source, self._options = source, options
-        self.channels = choose(source.path, source.topics, options.asked)
+        self.channels = choose(source.path, source.topics, options.requested_topics)
         self.start = options.start or beginning_of(source, self.channels.uav, self.channels.scan)
         """Initial pose; None: the map's origin."""
         self._joints = StaticTransforms()
@@ -122,7 +122,7 @@ class OfflineSlam:
         host.listen("/tf", self._on_tf)
         names = {theirs: ours for ours, theirs in self.channels.names.items()}
         num_scans, cpu, first, before, lasted = 0, 0.0, None, 0, 0
-        told = time.monotonic()
+        last_report = time.monotonic()
         for topic, time_ns, message in self._source.messages(set(names)):
             ours = names[topic]
             if ours == f"/{uav}/{LEVEL}":
@@ -130,22 +130,22 @@ class OfflineSlam:
             if topic == "/tf_static":
                 self._joints.add(message)
             if ours == f"/{uav}/odom":
-                place = message.pose.pose.position
-                self._wheels.append((place.x, place.y))
-            self._keep_nodding(ours, time_ns, message)
+                position = message.pose.pose.position
+                self._wheels.append((position.x, position.y))
+            self._store_nodding(ours, time_ns, message)
             if first is not None:
                 lasted += max(time_ns - before, 0)
             first, before = first or time_ns, time_ns
             began = time.thread_time()
             host.publish(ours, time_ns, message)
             cpu += time.thread_time() - began
-            if on_progress is not None and time.monotonic() - told > _PROGRESS_S:
-                told = time.monotonic()
+            if on_progress is not None and time.monotonic() - last_report > _PROGRESS_S:
+                last_report = time.monotonic()
                 on_progress(num_scans, lasted / NS_PER_S)
         self._end()
         return self._outcome(num_scans, lasted / NS_PER_S, cpu)
 
-    def _keep_nodding(self, topic: str, time_ns: int, message: Any) -> None:
+    def _store_nodding(self, topic: str, time_ns: int, message: Any) -> None:
         uav = self.channels.uav
         if topic == f"/{uav}/joint_states" and _JOINT in message.name:
             angle = float(message.position[list(message.name).index(_JOINT)])
@@ -156,7 +156,10 @@ class OfflineSlam:
 
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
-        parameters: dict[str, Any] = {"max_range_m": o.reach_m, "loop_closures": o.loop_closures}
+        parameters: dict[str, Any] = {
+            "max_range_m": o.max_range_m,
+            "loop_closures": o.loop_closures,
+        }
         if self.start is not None:
             parameters["initial_pose"] = list(self.start)
         level = None if o.level_mount is None else list(o.level_mount)
@@ -184,11 +187,11 @@ class OfflineSlam:
         self._frames = frames_of(
             self._source, {name: names[topic] for name, topic in topics.items() if topic in names}
         )
-        told = {"level": o.level_mount, "nodding": o.nodding_mount}
-        asked = {frame for name, frame in self._frames.items() if told[name] is None}
+        mounts = {"level": o.level_mount, "nodding": o.nodding_mount}
+        required = {frame for name, frame in self._frames.items() if mounts[name] is None}
         self._joints, unknown = read_joints(self._source, set(self._frames.values()))
         for name, frame in self._frames.items():
-            if frame in unknown & asked:
+            if frame in unknown & required:
                 raise RecordingError(
                     f"{self._source.path}: the log has no transform from {frame} to the body "
                     f"(/tf_static, /tf, /volery/scenario): give --{name}-mount X,Y,Z"
@@ -234,12 +237,12 @@ class OfflineSlam:
 
     def _end(self) -> None:
         """Waits for the final path."""
-        told: list[Any] = []
+        paths: list[Any] = []
         self._count_time()
         status, self._status = self._status, {}
-        self._host.listen(f"/{self.channels.uav}/slam/path", told.append)
-        self._host.wait(_PATIENCE_S, lambda: len(told) > 1)
-        self._path = told[-1] if told else None
+        self._host.listen(f"/{self.channels.uav}/slam/path", paths.append)
+        self._host.wait(_TIMEOUT_S, lambda: len(paths) > 1)
+        self._path = paths[-1] if paths else None
         self._status = {**status, **self._last_counts()}
 
     def _last_counts(self) -> dict[str, Any]:
@@ -251,24 +254,24 @@ class OfflineSlam:
             reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
             raise RecordingError(f"{self._source.path}: the SLAM did not start ({reason})")
         poses = [] if self._path is None else self._path.poses
-        keyframe_ns = np.array([stamp_of(one) for one in poses], np.int64)
-        keyframes = np.array([_four(one.pose) for one in poses]).reshape(-1, 4)
-        way = np.array(self._odometry)
+        keyframe_ns = np.array([stamp_of(stamped) for stamped in poses], np.int64)
+        keyframes = np.array([_four(stamped.pose) for stamped in poses]).reshape(-1, 4)
+        odometry = np.array(self._odometry)
         trajectory = corrected(
-            np.array(self._times, np.int64), way[:, :3], way[:, 3:], keyframe_ns, keyframes,
-            self._tilt,
+            np.array(self._times, np.int64), odometry[:, :3], odometry[:, 3:], keyframe_ns,
+            keyframes, self._tilt,
         )  # fmt: skip
         return SlamResult(
             self.channels, trajectory, self._scans, self._mount, num_scans, lasted_s, cpu_s,
             self._status, self._states, self._problems, self._nodding,
             np.array(sorted(self._nods)).reshape(-1, 2),
-            way_m(np.array(self._wheels)) if self._wheels else None,
+            path_length_m(np.array(self._wheels)) if self._wheels else None,
         )  # fmt: skip
 
     def _mount(self, frame: str) -> Mount:
         o, found = self._options, self._joints.mount_of(frame)
-        place = o.nodding_mount if frame == self._frames.get("nodding") else o.level_mount
-        return found if place is None else Mount(np.array(place), found.attitude)
+        position = o.nodding_mount if frame == self._frames.get("nodding") else o.level_mount
+        return found if position is None else Mount(np.array(position), found.attitude)
 
 
 def _four(pose: Any) -> tuple[float, float, float, float]:

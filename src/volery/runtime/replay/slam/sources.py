@@ -37,7 +37,7 @@ class LogSource:
     """Number of messages that cannot be decoded."""
     damage: str = ""
     """Damage that is visible without reading the messages."""
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     _walk: Any = field(default=None, repr=False)
 
     def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
@@ -67,7 +67,7 @@ class TextSource:
     refused: int = 0
     """Number of lines left out."""
     damage: str = ""
-    doubts: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     """Possible errors of the layout."""
 
     @property
@@ -88,7 +88,7 @@ class TextSource:
         for published in scans:
             if published.topic in wanted:
                 yield SlamInput(published.topic, published.time_ns, published.message)
-        self.refused, self.doubts = scans.left_out, scans.doubts
+        self.refused, self.warnings = scans.left_out, scans.warnings
         if scans.left_out:
             self.problem = f"{counted(scans.left_out, 'line')} left out; {scans.problem}"
 

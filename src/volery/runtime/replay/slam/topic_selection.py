@@ -39,27 +39,27 @@ class TopicSelection:
         return self.names[f"/{self.uav}/{LEVEL}"]
 
 
-def choose(path: Path, topics: dict[str, str], asked: RequestedTopics) -> TopicSelection:
+def choose(path: Path, topics: dict[str, str], requested: RequestedTopics) -> TopicSelection:
     """Selects among a log's topics, types by topic. Raises `RecordingError` if ambiguous."""
-    _check_uav(path, topics, asked)
-    scan = _one(path, topics, SCAN, asked.scan, asked.uav, LEVEL)
+    _check_uav(path, topics, requested)
+    scan = _one(path, topics, SCAN, requested.scan, requested.uav, LEVEL)
     assert scan is not None
-    uav = asked.uav or (scan.split("/")[1] if scan.endswith(f"/{LEVEL}") else "") or "uav1"
+    uav = requested.uav or (scan.split("/")[1] if scan.endswith(f"/{LEVEL}") else "") or "uav1"
     names = {f"/{uav}/{LEVEL}": scan, "/tf_static": "/tf_static"}
-    imu = _one(path, topics, IMU, asked.imu, uav, "imu", needed=bool(asked.has_imu))
+    imu = _one(path, topics, IMU, requested.imu, uav, "imu", needed=bool(requested.has_imu))
     nodding = f"/{uav}/{NODDING}"
-    wanted = asked.has_imu
-    if wanted is None:
-        wanted = imu is not None and nodding in topics
-    if wanted and imu is not None:
+    uses_imu = requested.has_imu
+    if uses_imu is None:
+        uses_imu = imu is not None and nodding in topics
+    if uses_imu and imu is not None:
         own = {f"/{uav}/{t}": f"/{uav}/{t}" for t in (NODDING, "joint_states", "range")}
         names |= {f"/{uav}/imu": imu, **{k: v for k, v in own.items() if v in topics}}
-    elif asked.has_odometry:
-        needed = asked.odometry is not None
-        odometry = _one(path, topics, ODOMETRY, asked.odometry, uav, "odom", needed=needed)
+    elif requested.has_odometry:
+        needed = requested.odometry is not None
+        odometry = _one(path, topics, ODOMETRY, requested.odometry, uav, "odom", needed=needed)
         if odometry is not None:
             names[f"/{uav}/odom"] = odometry
-    return TopicSelection(uav, names, bool(wanted))
+    return TopicSelection(uav, names, bool(uses_imu))
 
 
 def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
@@ -67,10 +67,10 @@ def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
     return sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {"", uav})
 
 
-def _check_uav(path: Path, topics: dict[str, str], asked: RequestedTopics) -> None:
+def _check_uav(path: Path, topics: dict[str, str], requested: RequestedTopics) -> None:
     """Raises `RecordingError` if the log has no topic of the requested UAV."""
-    uav = asked.uav
-    if uav is None or asked.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):
+    uav = requested.uav
+    if uav is None or requested.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):
         return
     known = _list(other_uavs(topics, uav))
     raise RecordingError(f"{path}: there is no {uav} in it; there is {known}")

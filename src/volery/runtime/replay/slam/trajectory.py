@@ -34,12 +34,12 @@ class EstimatedTrajectory(NamedTuple):
     @property
     def length_m(self) -> float:
         """Path length over ground, m."""
-        return way_m(self.position)
+        return path_length_m(self.position)
 
 
-def way_m(places: Array) -> float:
+def path_length_m(positions: Array) -> float:
     """Returns the path length over ground along positions (N, 2+), m."""
-    return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
+    return float(np.hypot(*np.diff(positions[:, :2], axis=0).T).sum())
 
 
 def rising(time_ns: Times) -> Times:
@@ -77,8 +77,8 @@ def corrected(
     """
     position, attitude = rotations.rotate(tilt, position), rotations.multiply(tilt, attitude)
     rows = rows_of_keyframes(keyframe_ns, time_ns)
-    kept = np.flatnonzero(rows >= 0)
-    rows, keyframes = rows[kept], keyframes[kept]
+    matched = np.flatnonzero(rows >= 0)
+    rows, keyframes = rows[matched], keyframes[matched]
     clock = rising(time_ns)
     if not len(rows):
         return EstimatedTrajectory(time_ns, clock, position, attitude)
@@ -86,12 +86,12 @@ def corrected(
     after = np.clip(np.searchsorted(rows, np.arange(len(clock)), side="right"), 1, len(rows))
     one, other = after - 1, np.minimum(after, len(rows) - 1)
     span = np.maximum(clock[rows[other]] - clock[rows[one]], 1)
-    share = np.clip((clock - clock[rows[one]]) / span, 0.0, 1.0)[:, None]
+    fraction = np.clip((clock - clock[rows[one]]) / span, 0.0, 1.0)[:, None]
     laid = [_laid(position, attitude, rows[k], keyframes[k], turns[k]) for k in (one, other)]
-    places = laid[0][0] + share * (laid[1][0] - laid[0][0])
+    positions = laid[0][0] + fraction * (laid[1][0] - laid[0][0])
     sign = np.where((laid[0][1] * laid[1][1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    turned = rotations.normalize((1.0 - share) * laid[0][1] + share * sign * laid[1][1])
-    return EstimatedTrajectory(time_ns, clock, places, turned)
+    turned = rotations.normalize((1.0 - fraction) * laid[0][1] + fraction * sign * laid[1][1])
+    return EstimatedTrajectory(time_ns, clock, positions, turned)
 
 
 def _laid(
@@ -109,10 +109,10 @@ def write_tum(path: Path, trajectory: EstimatedTrajectory) -> None:
     try:
         with whole_file(path) as file:
             file.write(b"# timestamp x y z qx qy qz qw\n")
-            for when, place, turn in zip(
+            for when, position, turn in zip(
                 trajectory.time_ns, trajectory.position, trajectory.attitude, strict=True
             ):
-                numbers = " ".join(f"{number:.6f}" for number in (*place, *turn))
+                numbers = " ".join(f"{number:.6f}" for number in (*position, *turn))
                 file.write(f"{when // 10**9}.{when % 10**9:09d} {numbers}\n".encode())
     except OSError as error:
         raise DataFileError(f"{path}: the path cannot be written: {error.strerror}") from None

@@ -17,21 +17,21 @@ import { finishOf } from "./finishes.ts";
 import { worldUniforms } from "./materials.ts";
 import type { Surface } from "./readWorld.ts";
 
-/** From so many degrees above the horizon each model is taken; evenly spaced from 0. */
+/** From so many degrees above the horizon each model is rendered; evenly spaced from 0. */
 export const ELEVATIONS = [0, 30, 60, 90] as const;
 const SIDE = 128;
 
-export interface TreePictures {
+export interface TreeImpostors {
   /** A column for each model, a row for each elevation; colour times opacity, without light. */
   texture: Texture;
 }
 
-/** Take pictures of all models, as they are without light. */
-export function takePictures(
+/** Render impostors of all models, as they are without light. */
+export function renderImpostors(
   shapes: readonly (readonly Surface[])[],
   spheres: readonly Sphere[],
   renderer: WebGLRenderer,
-): TreePictures {
+): TreeImpostors {
   const target = new WebGLRenderTarget(SIDE * shapes.length, SIDE * ELEVATIONS.length, {
     type: HalfFloatType,
     generateMipmaps: true,

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bridge_bench import IMAGE, PATIENCE_S, STRING, Refused, taken_port, vanish
+from bridge_bench import IMAGE, STRING, TIMEOUT_S, Refused, taken_port, vanish
 from ros_tcp_client import until
 
 from volery.core.errors import VoleryError
@@ -27,8 +27,8 @@ NOT_UTF8 = b"\xff\xfe\x80"
 STEP = 500_000
 STEPS = 200
 QUICK_PROBES = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
-MOST_GROWTH = 60e6
-"""Of a hundred megabytes published while somebody does not read."""
+MAX_GROWTH_BYTES = 60e6
+"""Of a hundred megabytes published while a client does not read."""
 
 
 class Served:
@@ -59,7 +59,7 @@ def others(bench, client):
 
 
 @pytest.mark.needs("leaving")
-def test_who_leaves_takes_everything_back(bench):
+def test_a_client_that_leaves_withdraws_everything(bench):
     bench.ours.collect(bench.topic_in, bench.type_in)
     before = bench.ours.counts()
     client = bench.connect()
@@ -85,7 +85,7 @@ def test_a_client_comes_back_after_its_sudden_death(bench, client):
 
 
 @pytest.mark.needs("leaving", "others")
-def test_who_speaks_no_more_counts_as_gone(bench, others):
+def test_a_silent_client_counts_as_gone(bench, others):
     """A client that closes its half of the connection has left, whatever it would still read."""
     others.check()
     before = bench.ours.counts()
@@ -101,8 +101,8 @@ def test_who_speaks_no_more_counts_as_gone(bench, others):
 
 @pytest.mark.needs("leaving", "others")
 @pytest.mark.parametrize("talking", [True, False])
-def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talking):
-    """Neither FIN nor RST came: found out by what is sent to it, or by asking whether it lives."""
+def test_a_client_that_vanished_is_detected(bench, others, monkeypatch, talking):
+    """Neither FIN nor RST came: detected by what is sent to it, or by a keepalive."""
     monkeypatch.setattr("volery.core.network_access.PROBES", QUICK_PROBES)
     others.check()
     before = bench.ours.counts()
@@ -120,7 +120,7 @@ def test_who_vanished_without_a_word_is_missed(bench, others, monkeypatch, talki
 
 
 @pytest.mark.needs("others")
-def test_half_a_frame_and_silence_harm_nobody(bench, client, others):
+def test_half_a_frame_and_silence_harm_no_client(bench, client, others):
     bench.ours.collect("/in")
     if "topics" not in bench.cannot:
         client.advertise("/in")
@@ -131,7 +131,7 @@ def test_half_a_frame_and_silence_harm_nobody(bench, client, others):
 
 
 @pytest.mark.needs("others")
-def test_who_does_not_read_costs_bounded_memory(bench, others):
+def test_a_client_that_does_not_read_costs_bounded_memory(bench, others):
     publish = bench.ours.publisher(bench.image_out, IMAGE)
     sleeper = bench.connect(reading=False)
     for one in (sleeper, others.client):
@@ -149,7 +149,7 @@ def test_who_does_not_read_costs_bounded_memory(bench, others):
     send(30)
     before = resident_bytes()
     send(STEPS)
-    until(lambda: resident_bytes() - before < MOST_GROWTH)  # what is on its way passes
+    until(lambda: resident_bytes() - before < MAX_GROWTH_BYTES)  # what is on its way passes
     others.check()
 
 
@@ -167,7 +167,7 @@ def resident_bytes():
 
 
 @pytest.mark.needs("own types")
-def test_unknown_types_are_told(bench, client, others):
+def test_unknown_types_are_reported(bench, client, others):
     if hasattr(client, "send_unknown_type"):
         client.send_unknown_type()
         assert "type 99" in client.error()
@@ -180,7 +180,7 @@ def test_unknown_types_are_told(bench, client, others):
     client.settle()
 
 
-def test_text_that_is_not_utf8_is_told(bench, client, others):
+def test_text_that_is_not_utf8_is_reported(bench, client, others):
     if client is not others.client:
         client.advertise(bench.topic_in)
     client.publish_bytes(bench.topic_in, NOT_UTF8)
@@ -192,7 +192,7 @@ def test_text_that_is_not_utf8_is_told(bench, client, others):
 
 
 @pytest.mark.needs("limits", "others")
-def test_a_frame_over_the_limit_is_told_with_the_limit(bench, client, others):
+def test_a_frame_over_the_limit_is_reported_with_the_limit(bench, client, others):
     client.send_too_much()
     if "errors" in bench.cannot:
         until(lambda: any(bench.over_limit in note for note in bench.error_of(client)))
@@ -215,7 +215,9 @@ def test_a_flood_of_one_client_delays_no_other(bench, client, others):
     thread.start()
     try:
         until(lambda: len(flooded) > 100)
-        for _ in range(7):  # the flood itself never ends: who had to wait for that would fail
+        for _ in range(
+            7
+        ):  # the flood itself never ends: a client that waited for its end would fail
             others.check()
     finally:
         stop.set()
@@ -223,7 +225,7 @@ def test_a_flood_of_one_client_delays_no_other(bench, client, others):
     others.check()
 
 
-def test_wrong_sums_are_told(bench, client, others):
+def test_wrong_sums_are_reported(bench, client, others):
     wrong = getattr(bench, "wrong_sum", None)
     if wrong is None:
         pytest.skip("sums: only ROS 1 names types with them")
@@ -248,38 +250,38 @@ def test_a_port_in_use_is_named(bench):
 
 
 @pytest.mark.needs("listening")
-def test_strangers_who_speak_another_protocol_harm_nobody(bench, others):
-    strangers = []
+def test_clients_of_another_protocol_harm_no_client(bench, others):
+    socks = []
     for words in (
         b"GET / HTTP/1.1\r\nHost: x\r\n\r\n",
         b"\x16\x03\x01\x02\0",
         bytes(5),
         b"\xff" * 900,
     ):
-        strangers.append(socket.create_connection(("127.0.0.1", bench.bridge.port)))
-        strangers[-1].sendall(words)
+        socks.append(socket.create_connection(("127.0.0.1", bench.bridge.port)))
+        socks[-1].sendall(words)
     others.check()
-    for stranger in strangers:
-        stranger.close()
+    for sock in socks:
+        sock.close()
     others.check()
 
 
 @pytest.mark.needs("listening")
 @pytest.mark.parametrize("words", [b"POST / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x16\x03\x01\x02\0"])
 def test_web_pages_and_tls_are_sent_away(bench, others, words):
-    stranger = socket.create_connection(("127.0.0.1", bench.bridge.port), PATIENCE_S)
-    with stranger, contextlib.suppress(ConnectionError):
+    sock = socket.create_connection(("127.0.0.1", bench.bridge.port), TIMEOUT_S)
+    with sock, contextlib.suppress(ConnectionError):
         for byte in words:
-            stranger.sendall(bytes((byte,)))
+            sock.sendall(bytes((byte,)))
         if bench.speaks_http:  # which waits for the end of a line, up to a deadline
-            stranger.shutdown(socket.SHUT_WR)
-        while stranger.recv(4096):
+            sock.shutdown(socket.SHUT_WR)
+        while sock.recv(4096):
             pass
     others.check()
 
 
 @pytest.mark.needs("listening", "others")
-def test_half_open_connections_keep_nobody_out(bench, others):
+def test_half_open_connections_keep_no_client_out(bench, others):
     """More than may be unproven at once; those that are there already notice nothing."""
     idle = [socket.create_connection(("127.0.0.1", bench.bridge.port)) for _ in range(100)]
     again = Served(bench, bench.connect())

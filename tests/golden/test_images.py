@@ -1,4 +1,4 @@
-"""Pictures of every world in every weather against stored ones; `studio.py` makes them."""
+"""Images of every world in every weather against stored ones; `studio.py` makes them."""
 
 import itertools
 
@@ -16,7 +16,7 @@ def studio(request):
 
 
 @pytest.mark.parametrize("weather", WEATHERS)
-def test_a_picture_is_the_stored_one(studio, weather):
+def test_an_image_is_the_stored_one(studio, weather):
     """But for edges of leaves, which another machine's last bits may move."""
     colour = studio.shoot(weather).colour[0].astype(int)
     off = np.abs(colour - stored(studio.view, weather))

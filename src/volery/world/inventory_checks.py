@@ -1,4 +1,4 @@
-"""Questions about inventories whose numbers are possible but most likely in another unit."""
+"""Warns about inventories whose numbers are possible but most likely in another unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SLENDEREST = 500.0
 _TOGETHER_M = 1.0
 
 
-def question(where: str, rows: NDArray[np.int64], table: NDArray[np.float64]) -> None:
+def warn_of_units(where: str, rows: NDArray[np.int64], table: NDArray[np.float64]) -> None:
     """Logs one warning for each doubtful column, once for each file.
 
     where: names the inventory. rows: (N,) of the file. table: (N, 4) x, y, diameter and height in

@@ -11,8 +11,8 @@ from pathlib import Path
 def _folder():
     """A folder for the process, in memory where there is such a one."""
     memory = Path("/dev/shm")
-    place = memory if memory.is_dir() else None
-    return tempfile.TemporaryDirectory(prefix="volery-fuzz-", dir=place)
+    parent = memory if memory.is_dir() else None
+    return tempfile.TemporaryDirectory(prefix="volery-fuzz-", dir=parent)
 
 
 def path_of(name):

@@ -1,4 +1,4 @@
-"""A recorded flight with cameras: each picture once, and recording is not what takes the time."""
+"""A recorded flight with cameras: each image once, and recording is not what takes the time."""
 
 import time
 
@@ -11,8 +11,8 @@ from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.publishing.camera_publishing import CameraPublisher
 
 pytestmark = pytest.mark.slow
-SHARE = 1.0 / 3.0
-"""Of the run's processor time, at most for making messages of pictures and writing the log."""
+MAX_FRACTION = 1.0 / 3.0
+"""Of the run's processor time, at most for making messages of images and writing the log."""
 
 
 class Timer:
@@ -32,7 +32,7 @@ class Timer:
         return timed
 
 
-def test_each_picture_is_recorded_once_and_cheaply(tmp_path, monkeypatch):
+def test_each_image_is_recorded_once_and_cheaply(tmp_path, monkeypatch):
     timer = Timer()
     monkeypatch.setattr(CameraPublisher, "publish", timer.of(CameraPublisher.publish))
     path = tmp_path / "flight.mcap"
@@ -45,7 +45,7 @@ def test_each_picture_is_recorded_once_and_cheaply(tmp_path, monkeypatch):
         total_s = time.process_time() - begun_s
         log.close()
         rates = simulation.diagnostics.image_rates
-    assert timer.spent_s < SHARE * total_s
+    assert timer.spent_s < MAX_FRACTION * total_s
     front = {
         topic.topic.removeprefix("/uav1/front/")
         for topic in summarize(path).topics
