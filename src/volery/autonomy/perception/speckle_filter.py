@@ -13,10 +13,13 @@ false returns of a scan, 99.9 % of a level and 97 % of a nodding UTM-30LX's true
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import read_only
+from volery.core.compiled import brief_kernel
 from volery.graph.messages import LaserScan
 
 NEAR_M = 0.15
@@ -38,17 +41,28 @@ class SpeckleFilter:
 
     def left_out(self, scan: LaserScan) -> LaserScan:
         """Returns the scan with an infinite range for every unconfirmed return."""
-        ranges = np.asarray(scan.ranges, dtype=np.float32)
-        before = self._before if len(self._before) == len(ranges) else np.full_like(ranges, np.inf)
+        ranges = read_only(np.asarray(scan.ranges, dtype=np.float32).view())
+        if len(self._before) != len(ranges):
+            self._before = read_only(np.full_like(ranges, np.inf))
+        kept = np.empty(len(ranges), np.float32)
+        _keep_confirmed(ranges, self._before, kept)
         self._before = ranges
-        found = np.zeros(len(ranges), dtype=np.int8)
-        with np.errstate(invalid="ignore"):  # infinite ranges confirm none
-            for step in range(-_ASIDE, _ASIDE + 1):
-                here = slice(max(step, 0), len(ranges) + min(step, 0))
-                there = slice(max(-step, 0), len(ranges) + min(-step, 0))
-                found[here] += np.abs(ranges[here] - before[there]) < NEAR_M
-                if step:
-                    found[here] += np.abs(ranges[here] - ranges[there]) < NEAR_M
-        needed = np.where(ranges < CLOSE_M, _NEEDED_CLOSE, _NEEDED)
-        kept = np.where(found >= needed, ranges, np.float32(np.inf))
         return dataclasses.replace(scan, ranges=kept)
+
+
+@brief_kernel
+def _keep_confirmed(
+    ranges: NDArray[np.float32], before: NDArray[np.float32], kept: NDArray[np.float32]
+) -> None:
+    """Fills `kept` with the ranges, infinite where unconfirmed."""
+    near, close = np.float32(NEAR_M), np.float32(CLOSE_M)
+    for k in range(len(ranges)):
+        needed = _NEEDED_CLOSE if ranges[k] < close else _NEEDED
+        kept[k] = np.inf
+        if not math.isfinite(ranges[k]):
+            continue
+        for other in range(max(k - _ASIDE, 0), min(k + _ASIDE + 1, len(ranges))):
+            needed -= abs(ranges[k] - before[other]) < near
+            needed -= other != k and abs(ranges[k] - ranges[other]) < near
+        if needed <= 0:
+            kept[k] = ranges[k]
