@@ -43,10 +43,10 @@ def measure() -> Measured:
     """Returns medians and 95th percentiles, ms; `lock_step`: one process, in wall time."""
     figures = _lock_step_figures()
     failures: dict[str, str] = {}
-    for name, bridge in (("rosbridge", RosbridgeServer(port=0)),):
-        with flying() as bridges:
-            bridges.open(bridge)
-            figures.update(call_figures(name, exchange(name, bridge.port)))
+    bridge = RosbridgeServer(port=0)
+    with flying() as bridges:
+        bridges.open(bridge)
+        figures.update(call_figures("rosbridge", exchange("rosbridge", bridge.port)))
     try:
         figures.update(_ros1_figures())
     except VoleryError as error:

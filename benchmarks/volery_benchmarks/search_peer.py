@@ -1,6 +1,6 @@
 """Runs one node of the bench `search` in its own process.
 
-    python -m volery_benchmarks.search_peer rosbridge|ros_tcp|ros1 PORT called|calling CALLS
+    python -m volery_benchmarks.search_peer rosbridge|ros1 PORT called|calling CALLS
 
 PORT is that of the bridge on this computer, 0 with ros1, whose master the environment names.
 `called` runs the node of a cooperative search, which returns the start time of its handler and ends
