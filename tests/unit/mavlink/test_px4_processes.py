@@ -1,6 +1,7 @@
 """Starting, watching and ending PX4 instances, with a program in place of PX4."""
 
 import contextlib
+import itertools
 import socket
 import sys
 import time
@@ -157,9 +158,14 @@ time.sleep(1000)
 
 def test_one_that_never_connects_is_reported_with_its_last_output(tmp_path, monkeypatch):
     output, end = make_px4(tmp_path, HANGS) / "bin/said", time.monotonic() + 60.0
-    is_over = lambda: output.exists() or time.monotonic() > end  # noqa: E731
-    wall = SimpleNamespace(monotonic=lambda: 2.0 if is_over() else 0.0)
-    monkeypatch.setattr("volery.cli.bridges.time", wall)
+    calls = itertools.count()
+
+    def monotonic():
+        """Returns 0 when the wait starts, and a time past its end once there is output."""
+        is_start = next(calls) == 0
+        return 0.0 if is_start or not (output.exists() or time.monotonic() > end) else 2.0
+
+    monkeypatch.setattr("volery.cli.bridges.time", SimpleNamespace(monotonic=monotonic))
     monkeypatch.setattr("volery.cli.bridges._START_TIMEOUT_S", 1.0)
     uavs = {"uav1": SimpleNamespace(airframe=load_airframe("f450"))}
     options = RunOptions("hover", px4_dir=tmp_path)
