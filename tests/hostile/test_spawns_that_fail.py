@@ -62,7 +62,7 @@ BUILD = [
     (Engine, "restart_sensors"),
     (manager, "start_nodes"),
     (SnapshotManager, "enlist"),
-    (snapshot_manager, "keep_nodes"),
+    (snapshot_manager, "save_nodes"),
 ]
 REMOVE = [
     *BUILD[:11],

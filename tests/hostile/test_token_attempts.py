@@ -180,12 +180,12 @@ def test_page(page, attempts, method):
             return request(page.port, "/api/status", source=source, bearer=token)
         return request(page.port, f"/api/status?token={token.replace(' ', '+')}", source=source)
 
-    attempts = [show(f"guess {k}") for k in range(ATTEMPTS)]
+    guessing = [show(f"guess {k}") for k in range(ATTEMPTS)]
     assert status_of(show(TOKEN, ELSEWHERE)) == 200
     late = show(TOKEN)
     until_waiting(attempts, ATTEMPTS + 1)
-    assert all(map(is_unanswered, attempts))  # in parallel they get no more than one by one
-    for attempt in attempts:
+    assert all(map(is_unanswered, guessing))  # in parallel they get no more than one by one
+    for attempt in guessing:
         attempt.close()
     assert status_of(late) == 200
 

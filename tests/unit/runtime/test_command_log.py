@@ -92,9 +92,9 @@ def test_what_only_paces_is_no_turn(flying, records):
 @pytest.mark.parametrize(
     ("kind", "srvtype", "weight"),
     [
-        ("call", f"{STANDARD}/GetEntities", CommandEffect.ASKS),
-        ("call", f"{OURS}/GetWeather", CommandEffect.ASKS),
-        ("call", "rosapi_msgs/srv/Topics", CommandEffect.ASKS),
+        ("call", f"{STANDARD}/GetEntities", CommandEffect.QUERIES),
+        ("call", f"{OURS}/GetWeather", CommandEffect.QUERIES),
+        ("call", "rosapi_msgs/srv/Topics", CommandEffect.QUERIES),
         ("call", "rosapi_msgs/srv/SetParam", CommandEffect.CHANGES),
         ("call", f"{STANDARD}/StepSimulation", CommandEffect.PACES),
         ("call", f"{STANDARD}/SpawnEntity", CommandEffect.CHANGES),
