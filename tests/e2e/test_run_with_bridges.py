@@ -419,16 +419,16 @@ def test_a_client_unloads_the_world_and_loads_one_again():
 def test_files_of_one_flight_stay_of_one_world(tmp_path):
     change = _Change(RunOptions("hover", record=tmp_path / "a.mcap"))
     with pytest.raises(CommandError, match="--record"):
-        change.ask(WorldRequest("swarm_100"))
+        change.request_world(WorldRequest("swarm_100"))
     change = _Change(RunOptions("hover", digest=True))
     with pytest.raises(CommandError, match="--digest"):
-        change.ask(WorldRequest("swarm_100"))
+        change.request_world(WorldRequest("swarm_100"))
     change = _Change(RunOptions("hover", uavs=3))
-    change.quit = lambda: quits.append(change.wanted)
+    change.quit = lambda: quits.append(change.request)
     quits = []
     with pytest.raises(VoleryError):
-        change.ask(WorldRequest("atlantis"))
+        change.request_world(WorldRequest("atlantis"))
     with pytest.raises(VoleryError, match="inventory"):
-        change.ask(WorldRequest("hover", Changes(tree_share=0.5)))
-    change.ask(WorldRequest("longleaf", Changes(tree_share=0.5, speed=0.0)))
-    assert quits == [change.wanted]
+        change.request_world(WorldRequest("hover", Changes(tree_share=0.5)))
+    change.request_world(WorldRequest("longleaf", Changes(tree_share=0.5, speed=0.0)))
+    assert quits == [change.request]
