@@ -35,11 +35,12 @@ def percentages(uavs: int, seconds: float) -> dict[str, float]:
     scenario = search_scenario(uavs, 1, _CLIMB_S + seconds + 1.0)
     with Simulation(scenario, threads=1) as simulation:
         simulation.run(_CLIMB_S)
-        nodes, stages = _busy(simulation), simulation.diagnostics.stage_cpu_s
+        simulation.diagnostics.count_cpu_time()
+        nodes, stages = _busy(simulation), simulation.diagnostics.stage_seconds
         began = time.process_time()
         simulation.run(seconds)
         process_s = time.process_time() - began
-        took = {k: v - stages[k] for k, v in simulation.diagnostics.stage_cpu_s.items()}
+        took = {k: v - stages[k] for k, v in simulation.diagnostics.stage_seconds.items()}
         thought = {name: busy - nodes[name] for name, busy in _busy(simulation).items()}
         inline_s = sum(
             busy for name, busy in thought.items() if name not in _with_latency(simulation)

@@ -60,6 +60,12 @@ def test_roll_pitch_yaw_are_fixed_axis_angles(roll, pitch, yaw):
     assert same_rotation(rot.from_rpy(*rot.to_rpy(q)), q, 1e-7)
 
 
+@given(arrays(np.float64, 3, elements=st.floats(-3.1, 3.1)))
+def test_a_yaw_alone_is_a_roll_and_pitch_of_zero_to_the_byte(yaw):
+    assert rot.from_yaw(yaw).tobytes() == rot.from_rpy(0.0, 0.0, yaw).tobytes()
+    assert rot.from_yaw(yaw[0]).tobytes() == rot.from_rpy(0.0, 0.0, yaw[0]).tobytes()
+
+
 def test_functions_broadcast_over_leading_axes():
     q = rot.from_rpy(np.zeros((5, 2)), 0.1, 0.2)
     assert q.shape == (5, 2, 4)

@@ -99,6 +99,14 @@ def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
     )
 
 
+def from_yaw(yaw: ArrayLike) -> Array:
+    """Returns quaternions (..., 4) of rotations about z, rad."""
+    half = np.asarray(yaw, dtype=np.float64) / 2.0
+    q = np.zeros((*half.shape, 4))
+    q[..., 2], q[..., 3] = np.sin(half), np.cos(half)
+    return q
+
+
 def to_rpy(q: ArrayLike) -> Array:
     """Returns roll, pitch, yaw (..., 3), rad; pitch in [-pi/2, pi/2]."""
     x, y, z, w = _components(q)

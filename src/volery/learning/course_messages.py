@@ -106,5 +106,5 @@ def _max_lookahead_s(task: Task) -> float:
 
 def _pose(waypoint: Array) -> Pose:
     """Returns the pose of (x, y, z, yaw)."""
-    attitude = rotations.from_rpy(0.0, 0.0, math.remainder(float(waypoint[3]), math.tau))
+    attitude = rotations.from_yaw(math.remainder(float(waypoint[3]), math.tau))
     return Pose(Point(*waypoint[:3].tolist()), Quaternion(*attitude.tolist()))

@@ -100,8 +100,7 @@ class OdometryBank(NoisyBank):
         self._last_position[rows] = self._position_odom[rows]
 
     def _yaw_turn(self) -> Array:
-        zero = np.zeros_like(self._yaw_error)
-        return rotations.from_rpy(zero, zero, self._yaw_error)
+        return rotations.from_yaw(self._yaw_error)
 
 
 class GroundTruthBank(Memoryless):

@@ -153,7 +153,7 @@ class GapFlight(SavedAttributes, Node):
         above = float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
         climb = 1.2 * (self._height - above) + float(velocity @ self._ground.slope)
         climb = max(-1.0, min(2.0, climb))
-        forward = rotations.rotate(rotations.from_rpy(0.0, 0.0, -pose.yaw), [*velocity, 0.0])
+        forward = rotations.rotate(rotations.from_yaw(-pose.yaw), [*velocity, 0.0])
         self._command.publish(
             Twist(Vector3(float(forward[0]), float(forward[1]), climb), Vector3(0.0, 0.0, yaw_rate))
         )

@@ -79,7 +79,7 @@ def _grid(field: CoverageField, values: NDArray[np.generic], now_ns: int) -> Occ
     data = values.astype(np.int8).ravel()
     data.flags.writeable = False
     rows, columns = field.free.shape
-    turn = Quaternion(*rotations.from_rpy(0.0, 0.0, field.yaw).tolist())
+    turn = Quaternion(*rotations.from_yaw(field.yaw).tolist())
     origin = Pose(Point(*field.origin_map, 0.0), turn)
     info = MapMetaData(time_from_ns(now_ns), single(field.cell_m), columns, rows, origin)
     return OccupancyGrid(header(now_ns, "map"), info, data)

@@ -245,9 +245,7 @@ class KeyframeGraph(SavedAttributes):
         """Updates the transform of the odometry's frame from the newest keyframe."""
         frame, pose = self.frames[-1], self.poses[-1]
         level = level_of(gravity, frame.attitude)
-        turn = rotations.multiply(
-            rotations.from_rpy(0.0, 0.0, float(pose[3]) - level.yaw), level.attitude
-        )
+        turn = rotations.multiply(rotations.from_yaw(float(pose[3]) - level.yaw), level.attitude)
         self.correction = KeyframePose(pose[:3] - rotations.rotate(turn, frame.position), turn)
 
 

@@ -63,7 +63,7 @@ def turn_of_heading(level: Level, attitude: Array, settling: Array) -> float:
 
     `attitude` (4,) is that at the end; its level axes are `level`.
     """
-    ahead = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
+    ahead = rotations.multiply(rotations.from_yaw(-level.yaw), level.attitude)
     before = rotations.multiply(rotations.multiply(ahead, attitude), rotations.conjugate(settling))
     return -float(rotations.yaw_of(before))
 
@@ -104,7 +104,7 @@ class KeyframeBuilder:
         points = np.concatenate([*self._points, np.zeros((0, 3))])
         kinds = np.concatenate([*self._kinds, np.zeros(0, np.int8)])
         chosen = np.concatenate([_spread(kinds, kind) for kind in _MAX_POINTS])
-        turn = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
+        turn = rotations.multiply(rotations.from_yaw(-level.yaw), level.attitude)
         own = rotations.rotate(turn, points[chosen] - position)
         self._points, self._kinds = [], []
         return Keyframe(

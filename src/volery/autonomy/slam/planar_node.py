@@ -189,10 +189,8 @@ class PlanarSlam(SavedAttributes, Node):
         pose, velocity = motion.pose, motion.velocity
         state = (
             np.array([pose[0], pose[1], 0.0]),
-            rotations.from_rpy(0.0, 0.0, float(pose[2])),
-            rotations.rotate(
-                rotations.from_rpy(0.0, 0.0, float(pose[2])), [velocity[0], velocity[1], 0.0]
-            ),
+            rotations.from_yaw(float(pose[2])),
+            rotations.rotate(rotations.from_yaw(float(pose[2])), [velocity[0], velocity[1], 0.0]),
             np.array([0.0, 0.0, velocity[2]]),
         )
         covariance = np.zeros((9, 9))
@@ -204,10 +202,10 @@ class PlanarSlam(SavedAttributes, Node):
         spread = self._keyframe_graph.covariance + motion.covariance[:3, :3]
         known = np.sqrt(np.maximum(np.diag(spread), 0.0))
         sigmas = np.array([known[0], known[1], 0.0, 0.0, 0.0, known[2]])
-        turn = rotations.from_rpy(0.0, 0.0, float(yaw))
+        turn = rotations.from_yaw(float(yaw))
         self._pose.publish(messages.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
         at = self._keyframe_graph.correction
-        turn = rotations.from_rpy(0.0, 0.0, float(at[2]))
+        turn = rotations.from_yaw(float(at[2]))
         position = np.array([at[0], at[1], z])
         self._tf.publish(messages.map_from_odom(time_ns, self._uav, position, turn))
 

@@ -146,6 +146,6 @@ def _find_position(state: Array, covariance: Array, maps: Submaps, body: Array) 
     if found[3] < _POSITION_FRACTION or found[4] > _ELSEWHERE * found[3]:
         return False
     state[P : P + 2] += found[:2]
-    around = rotations.from_rpy(0.0, 0.0, float(found[2]))
+    around = rotations.from_yaw(float(found[2]))
     state[Q : Q + 4] = rotations.multiply(around, state[Q : Q + 4])
     return True

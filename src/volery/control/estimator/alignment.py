@@ -39,7 +39,7 @@ def align_at_rest(
     seen = rotations.rotate(level, magnetic_body)
     known = np.asarray(magnetic_field_map, dtype=np.float64)
     yaw = np.arctan2(known[1], known[0]) - np.arctan2(seen[..., 1], seen[..., 0])
-    return rotations.multiply(rotations.from_rpy(0.0, 0.0, yaw), level)
+    return rotations.multiply(rotations.from_yaw(yaw), level)
 
 
 def start_covariance(settings: EstimatorSettings, start: StartSigmas, attitude: Array) -> Array:

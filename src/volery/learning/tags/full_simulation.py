@@ -58,5 +58,5 @@ def add_tag(data: dict[str, Any], uav_type: str, latency_s: float) -> None:
 def place_tag(simulation: Simulation, flight: Flight) -> None:
     """Moves the tag to its position and yaw in the values of a flight of one environment."""
     yaw = float(flight.values[TAG_YAW][0, 0])
-    attitude = rotations.from_rpy(0.0, 0.0, math.remainder(yaw, math.tau))
+    attitude = rotations.from_yaw(math.remainder(yaw, math.tau))
     simulation.world.set_actor_pose(_ACTOR, flight.values[GOAL][0, 0], attitude)

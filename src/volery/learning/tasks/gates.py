@@ -54,9 +54,8 @@ def gates() -> Task:
 def _begin(flight: Flight, envs: NDArray[np.int64]) -> EnvironmentStart:
     heading = course.draw_gates(flight, envs, _NUM_GATES, start_map=_START)
     yaw = heading + flight.draws.uniform(envs, -0.5, 0.5)
-    zero = np.zeros(len(envs))
     return EnvironmentStart(
         np.broadcast_to(_START, (len(envs), 1, 3)),
-        rotations.from_rpy(zero, zero, yaw)[:, None],
+        rotations.from_yaw(yaw)[:, None],
         starts.vectors_in_ball(flight, envs, 0.5),
     )

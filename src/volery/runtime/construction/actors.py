@@ -67,7 +67,7 @@ def _print_tags(tag: schema.AprilTag) -> tuple[str, ...]:
 def _attached(actor: schema.Actor, motions: Mapping[str, ActorMotion]) -> ActorMotion:
     motion = actor.motion
     assert isinstance(motion, schema.AttachedActor)
-    attitude = rotations.from_rpy(0.0, 0.0, math.radians(motion.yaw_deg))
+    attitude = rotations.from_yaw(math.radians(motion.yaw_deg))
     return AttachedMotion(motions[motion.actor], [*motion.position_m, *attitude.tolist()])
 
 
@@ -92,5 +92,5 @@ def _motion(actor: schema.Actor, ground: HeightAt) -> ActorMotion:
         )
     assert isinstance(motion, schema.ExternalActor)
     x, y, *rest = motion.position_m
-    attitude = rotations.from_rpy(0.0, 0.0, math.radians(motion.yaw_deg))
+    attitude = rotations.from_yaw(math.radians(motion.yaw_deg))
     return GivenMotion([x, y, rest[0] if rest else ground(x, y), *attitude.tolist()])

@@ -61,7 +61,7 @@ def place_uavs(
     starts: list[StartPose] = []
     for g, group in enumerate(scenario.uavs):
         airframe = airframes[group.type]
-        yaw = rotations.from_rpy(0.0, 0.0, math.radians(group.yaw_deg))
+        yaw = rotations.from_yaw(math.radians(group.yaw_deg))
         altitude = scenario.types[group.type].flight.take_off_altitude_m
         for k in range(group.count):
             name = f"uav{len(starts) + 1}"
@@ -224,7 +224,7 @@ def landed_pose(
     depth = _position_on_feet(position[:2], airframe, terrain)[2] - position[2]
     if depth > _AT_REST_M or not stands_on_ground(position, airframe, terrain):
         return position, attitude, False
-    yaw = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(attitude))
+    yaw = rotations.from_yaw(rotations.yaw_of(attitude))
     rest = resting(position[:2], yaw, airframe, terrain)
     if rest is not None:
         return (*rest, True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 
 from volery.core.errors import CommandError
@@ -36,13 +37,12 @@ class SimulationDiagnostics:
 
     @property
     def stage_seconds(self) -> dict[str, float]:
-        """Wall seconds in each stage of the step so far."""
+        """Wall seconds in each stage of the step so far; see `count_cpu_time`."""
         return dict(self._engine.stage_seconds)
 
-    @property
-    def stage_cpu_s(self) -> dict[str, float]:
-        """CPU seconds of this thread in each stage so far."""
-        return dict(self._engine.stage_cpu_s)
+    def count_cpu_time(self) -> None:
+        """Counts CPU seconds of the thread that runs the stages from now on, which costs more."""
+        self._engine.stage_clock = time.thread_time
 
     @property
     def nodes(self) -> dict[str, NodeEndpoints]:

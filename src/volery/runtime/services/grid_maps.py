@@ -91,7 +91,7 @@ def occupancy_of(grid: GridMap, time_ns: int) -> OccupancyGrid:
     """Returns the map as a message: 100 blocked, 0 free."""
     data = np.where(grid.blocked, np.int8(_BLOCKED), np.int8(_FREE)).ravel()
     data.flags.writeable = False
-    turn = rotations.from_rpy(0.0, 0.0, grid.yaw_rad)
+    turn = rotations.from_yaw(grid.yaw_rad)
     info = MapMetaData(
         time_from_ns(time_ns),
         single(grid.cell_size_m),

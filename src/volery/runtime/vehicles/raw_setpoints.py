@@ -47,7 +47,7 @@ def steer_to_message(uav: Uav, message: Any) -> None:
     if message.coordinate_frame == HEADING_FRAME:
         if position is not None:
             raise CommandError("positions are in the map frame; use coordinate_frame 1")
-        turn = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(uav.attitude))
+        turn = rotations.from_yaw(rotations.yaw_of(uav.attitude))
         velocity = None if velocity is None else rotations.rotate(turn, velocity)
         push = None if push is None else rotations.rotate(turn, push)
     elif message.coordinate_frame != MAP_FRAME:

@@ -14,7 +14,7 @@ from volery.autonomy.perception.tags.detector import DetectedTag, load_opencv
 from volery.core import rotations
 from volery.core.arrays import Array
 
-_IMAGE_FROM_TAG = rotations.from_rpy(0.0, 0.0, 0.5 * np.pi)
+_IMAGE_FROM_TAG = rotations.from_yaw(0.5 * np.pi)
 """Rotation from the tag's frame to OpenCV's frame of the image: x right, y up."""
 
 
