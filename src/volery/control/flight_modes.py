@@ -67,6 +67,10 @@ class FlightMode(IntEnum):
         )
 
 
+DOWN_MODES = (FlightMode.LANDED, FlightMode.CRASHED)
+"""Modes of a UAV that has come down, or not yet taken off."""
+
+
 LANDED = int(FlightMode.LANDED)
 TAKE_OFF = int(FlightMode.TAKE_OFF)
 HOLD = int(FlightMode.HOLD)

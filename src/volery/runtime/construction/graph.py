@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from volery.control.flight_modes import FlightMode
+from volery.control.flight_modes import DOWN_MODES, FlightMode
 from volery.core import rotations
 from volery.core.clock import ns_from_s
 from volery.core.errors import CommandError, ScenarioError
@@ -132,9 +132,7 @@ def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
 
 def all_down(uavs: Mapping[str, Uav], events: Sequence[Event]) -> bool:
     """Returns whether every UAV has crashed, or has flown and landed."""
-    modes = [uav.mode for uav in uavs.values()]
+    if any(uav.mode not in DOWN_MODES for uav in uavs.values()):  # most often the first one flies
+        return False
     flown = {event.uav for event in events}
-    return all(
-        mode is FlightMode.CRASHED or (mode is FlightMode.LANDED and name in flown)
-        for name, mode in zip(uavs, modes, strict=True)
-    )
+    return all(uav.mode is FlightMode.CRASHED or name in flown for name, uav in uavs.items())

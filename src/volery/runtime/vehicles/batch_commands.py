@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.batch_limits import BatchLimits
 from volery.control.fleet import Fleet
-from volery.control.flight_modes import FlightMode
+from volery.control.flight_modes import DOWN_MODES, FlightMode
 from volery.control.setpoints import ControlLevel
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
@@ -55,7 +55,6 @@ class FlightFutureList(list[FlightFuture]):
         return results
 
 
-_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _NOT_GUIDED = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
 _NOT_LOW_LEVEL = (FlightMode.CRASHED,)
 
@@ -258,7 +257,7 @@ class BatchCommands(Uncopied, ABC):
     # ------------------------------------------------------------------------------------ inside
 
     def _flying(self) -> list[Uav]:
-        return [uav for uav in self._handles() if uav.mode not in _DOWN]
+        return [uav for uav in self._handles() if uav.mode not in DOWN_MODES]
 
     def _begin_all(
         self, command: str, uavs: Sequence[Uav], begin: Callable[[Uav], FlightFuture]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from volery.control.flight_modes import FlightMode
+from volery.control.flight_modes import DOWN_MODES, FlightMode
 from volery.engine.engine import Engine
 from volery.engine.events import Event, EventKind
 from volery.runtime.vehicles.low_battery import level_of, mode_at
@@ -16,8 +16,6 @@ from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import Scenario
 from volery.vehicle.battery import BatteryLevel
 from volery.vehicle.plant_types import RigidBody
-
-_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 
 _log = logging.getLogger(__name__)
 
@@ -41,7 +39,7 @@ class BatteryFailsafe:
         level = level_of(self._engine.fleet, row)
         mode = self._action(scenario.types[uav.type_name].flight.low_battery_action, level, uav)
         consequence = "" if mode is None else _CONSEQUENCES[mode]
-        if level is BatteryLevel.EMPTY and uav.mode not in _DOWN:
+        if level is BatteryLevel.EMPTY and uav.mode not in DOWN_MODES:
             has_rotors = isinstance(self._engine.fleet.plants[row], RigidBody)
             consequence = ": its rotors stop" if has_rotors else ": its plant flies on without it"
         _log.warning(
@@ -62,7 +60,7 @@ class BatteryFailsafe:
     def _action(self, action: str, level: BatteryLevel, uav: Uav) -> FlightMode | None:
         """Returns the mode that a UAV enters at a battery level; landings continue."""
         mode = mode_at(level, action)
-        if mode is None or uav.mode in (*_DOWN, FlightMode.LAND, mode):
+        if mode is None or uav.mode in (*DOWN_MODES, FlightMode.LAND, mode):
             return None
         return mode
 

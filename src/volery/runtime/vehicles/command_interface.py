@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.control.flight_modes import FlightMode
+from volery.control.flight_modes import DOWN_MODES, FlightMode
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
@@ -31,7 +31,6 @@ _TRIGGER = "std_srvs/srv/Trigger"
 _SPEEDS = "std_msgs/msg/Float32MultiArray"
 _POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
-_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
 """Modes that no topic ends: a landing continues while a stream of Twists arrives."""
 
@@ -137,9 +136,9 @@ def _careful(
         try:
             take(published.message)
         except (CommandError, AttributeError) as error:
-            if not (streamed and uav.mode in _DOWN):
+            if not (streamed and uav.mode in DOWN_MODES):
                 graph.refuse(topic, str(error))
-            if not has_warned and uav.mode not in _DOWN:
+            if not has_warned and uav.mode not in DOWN_MODES:
                 has_warned = True
                 _log.warning("%s: a command is not obeyed: %s", topic, error)
 
