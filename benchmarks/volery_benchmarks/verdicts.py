@@ -234,8 +234,8 @@ PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
 
 _GUST = (
     "faults[0].at_s=1:8",
-    "faults[0].velocity_m_s[0]=-14:14",
-    "faults[0].velocity_m_s[1]=-14:14",
+    "faults[0].velocity_m_s[0]=-11:11",
+    "faults[0].velocity_m_s[1]=-11:11",
 )
 """When a gust comes, and its velocity."""
 
