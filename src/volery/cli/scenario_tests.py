@@ -179,6 +179,7 @@ class _Test:
 
     def __init__(self, path: str, name: str, options: TestOptions) -> None:
         self._path, self._options = path, options
+        self._trust_option = " --trust" if options.trust else ""
         trust = options.trust or path in library.names() or may_run_code_of(Path(path))
         scenario = load_scenario(path, trust=trust)
         if not scenario.expect:
@@ -224,7 +225,7 @@ class _Test:
         parameters = self._loaded.study.parameters
         changes = {parameters[name].key: value for name, value in found.values.items()}
         end_s = _end_s(found.result)
-        replay = f"volery run {file}{end_s} --page"
+        replay = f"volery run {file}{end_s}{self._trust_option} --page"
         flight = TestedFlight(found.seed, changes, found.result, replay, None)
         return SearchedScenario(self._path, found.flights, flight, file)
 
@@ -249,7 +250,7 @@ class _Test:
             scenario = self._loaded.scenario_of(values).with_(seed=seed)
             scenario.save(file, overwrite=True)
             what = str(file)
-        return f"volery run {what} --seed {seed}{_end_s(result)} --page"
+        return f"volery run {what} --seed {seed}{_end_s(result)}{self._trust_option} --page"
 
 
 def _end_s(result: RunResult) -> str:

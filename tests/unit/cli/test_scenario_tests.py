@@ -179,6 +179,7 @@ def test_a_node_that_fails_is_an_error_of_its_flight(hop, tmp_path):
     done = test(path, "--trust", "--no-logs", "--junit", junit, "--out", tmp_path / "out")
     assert done.exit_code == 1, done.output
     assert f"{path}  E  " in done.output
+    assert f"volery run {path} --seed 1 --trust --page" in done.output
     assert "a <reason>" in done.output
     case = ElementTree.parse(junit).getroot().find("testsuite/testcase")
     assert "a <reason>" in case.find("error").get("message")
