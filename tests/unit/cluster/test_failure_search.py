@@ -83,6 +83,18 @@ def test_a_margin_that_leads_there_is_followed():
     assert counts[RandomSampler] > 1.5 * counts[TpeSampler]
 
 
+def test_the_search_does_not_settle_where_margins_are_low():
+    """A quarter of the square is far from the best corner; one proposal in four is random."""
+    pytest.importorskip("optuna")
+    for seed in range(4):
+        sampler, num_far = TpeSampler(2, seed), 0
+        for proposal in range(160):
+            (point,) = sampler.propose(1)
+            sampler.learn([sum(point)])
+            num_far += proposal >= 40 and min(point) > 0.5
+        assert num_far >= 7  # without the random ones 4 or 5
+
+
 def test_no_failure_takes_all_flights():
     search, executor = search_of(lambda _values, _seed: 1.0, num_workers=2)
     assert search.search(RandomSampler(search.dimensions, 1), 7) is None

@@ -60,18 +60,13 @@ def formation_fitness(positions: ArrayLike, velocities: ArrayLike) -> FormationF
 
 def flock_of(positions: ArrayLike, velocities: ArrayLike) -> Array:
     """Returns a flock (4, N): x, y, vx, vy. Raises `PlanError` as `formation_fitness` does."""
-    positions_m, speeds = np.asarray(positions, float), np.asarray(velocities, float)
-    if (
-        positions_m.ndim != 2
-        or positions_m.shape[1] != 2
-        or positions_m.shape != speeds.shape
-        or not len(positions_m)
-    ):
+    xy, speeds = np.asarray(positions, float), np.asarray(velocities, float)
+    if xy.ndim != 2 or xy.shape[1] != 2 or xy.shape != speeds.shape or not len(xy):
         raise PlanError(
-            f"positions and velocities of a flock are (N, 2) each, not {positions_m.shape} and "
+            f"positions and velocities of a flock are (N, 2) each, not {xy.shape} and "
             f"{speeds.shape}"
         )
-    flock: Array = np.concatenate((positions_m.T, speeds.T))
+    flock: Array = np.concatenate((xy.T, speeds.T))
     if not np.isfinite(flock).all():
         raise PlanError("a flock's positions and velocities must be finite")
     return flock

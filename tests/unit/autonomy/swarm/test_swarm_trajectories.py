@@ -65,6 +65,15 @@ def test_a_path_that_is_blocked_ends_before_the_obstacle():
     assert np.hypot(*swarm.velocity[0]) < 0.5
 
 
+def test_uavs_that_have_arrived_give_way():
+    """A row too dense to fly through lets one pass, and closes again."""
+    row = np.column_stack([np.full(15, 15.0), 3.0 * np.arange(-7, 8)])
+    swarm = Swarm(Trajectories(), [[0.0, 0.2], *row], [[30.0, 0.2], *row])
+    swarm.fly(60.0)
+    assert np.linalg.norm(swarm.position - swarm.goal, axis=1).max() < 0.5
+    assert swarm.min_distance > 1.5
+
+
 def test_a_uav_that_is_displaced_gets_a_trajectory_from_there():
     swarm = Swarm(Trajectories(), [[0.0, 0.0], [0.0, 10.0]], [AHEAD, [100.0, 10.0]])
     swarm.fly(5.0)
