@@ -182,7 +182,7 @@ def _search(quick: bool) -> dict[str, float]:
             def flights(kind: Callable[[int, int], Sampler], seed: int, max_flights: int) -> int:
                 search = FailureSearch(loaded, variations, (1, 1), executor)
                 found = search.search(kind(search.dimensions, seed), max_flights)
-                return max_flights + 1 if found is None else found.flights
+                return max_flights + 1 if found.result.is_passed else found.flights
 
             guided = [flights(TpeSampler, seed, _MAX_FLIGHTS) for seed in seeds]
             random = [flights(RandomSampler, seed, _MAX_RANDOM_FLIGHTS) for seed in seeds]

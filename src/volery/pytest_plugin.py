@@ -1,13 +1,14 @@
 """A plugin of pytest: scenarios with `[[expect]]` are tests, and tests fly scenarios.
 
-Enable it in `conftest.py`: `pytest_plugins = ["volery.pytest_plugin"]`. It then collects files
-named `test_*.toml` or `*_test.toml`, one test for each seed, and offers the fixture `flight` and
-the marker `seeds`. docs/scenario_tests.md explains it.
+pytest loads it by its entry point. It collects scenarios named `test_*.toml` or `*_test.toml`, one
+test for each seed, and offers the fixture `flight` and the marker `seeds`; docs/scenario_tests.md
+explains it. `-p no:volery.pytest_plugin` switches it off.
 """
 
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,10 @@ _UNSAFE = re.compile(r"[^\w.-]+")
 
 
 class FlightFailedError(AssertionError):
-    """A flight did not pass; the text gives the verdicts and the files that were kept."""
+    """A flight did not pass.
+
+    The first line is the first failure, the others are the verdicts and the files that were kept.
+    """
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -63,9 +67,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
     """Collects scenario files."""
-    if any(file_path.match(pattern) for pattern in _PATTERNS):
-        return ScenarioFile.from_parent(parent, path=file_path)
-    return None
+    if not any(file_path.match(pattern) for pattern in _PATTERNS):
+        return None
+    from volery.scenario.load import has_tables
+
+    return ScenarioFile.from_parent(parent, path=file_path) if has_tables(file_path) else None
 
 
 class ScenarioFile(pytest.File):
@@ -118,17 +124,21 @@ def flight(request: pytest.FixtureRequest) -> Callable[..., JudgedFlight]:
     A relative file is beside the test. Keys are those of `Scenario.with_`. Returns the flight with
     its verdicts; fails the test if one of them is not passed, unless `check=False`.
     """
-    from volery.scenario.load import list_scenarios, load_scenario
+    from volery.scenario.load import load_scenario
     from volery.scenario.schema import Scenario
     from volery.verdicts.flights import judged_flight
 
     def fly(scenario: Scenario | str | Path, *, check: bool = True, **keys: Any) -> JudgedFlight:
-        if not isinstance(scenario, Scenario):
-            is_shipped = str(scenario) in list_scenarios()
-            source = scenario if is_shipped else request.path.parent / scenario
-            scenario = load_scenario(source, trust=True)
-        flown = scenario.with_(keys) if keys else scenario
-        judged = judged_flight(flown)
+        __tracebackhide__ = True
+        try:
+            if not isinstance(scenario, Scenario):
+                file = request.path.parent / scenario
+                is_file = file.suffix == ".toml" or file.exists()
+                scenario = load_scenario(file if is_file else scenario, trust=True)
+            flown = scenario.with_(keys) if keys else scenario
+            judged = judged_flight(flown)
+        except ScenarioError as error:
+            pytest.fail(str(error))
         if check:
             _check(request.node, flown, judged)
         return judged
@@ -137,31 +147,40 @@ def flight(request: pytest.FixtureRequest) -> Callable[..., JudgedFlight]:
 
 
 def _check(item: pytest.Item, scenario: Scenario, judged: JudgedFlight) -> None:
-    """Raises `FlightFailedError` for a failed flight, whose log and map it keeps."""
+    """Raises `FlightFailedError` for a failed flight, of which it keeps files."""
+    __tracebackhide__ = True
     if judged.is_passed:
         return
+    failures = [verdict.describe() for verdict in judged.verdicts if not verdict.is_passed]
+    more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
     lines = [f"{verdict.outcome!s:7} {verdict.describe()}" for verdict in judged.verdicts]
-    for kind, file in _kept(item, scenario, judged):
-        item.user_properties.append((kind, str(file)))
-        lines.append(f"{kind:7} {file}")
-    raise FlightFailedError("\n".join([repr(scenario), *lines]))
+    for kind, hint in _kept(item, scenario, judged):
+        item.user_properties.append((kind, hint))
+        lines.append(f"{kind:7} {hint}")
+    first = f"{scenario.name}, seed {scenario.seed}: {failures[0]}{more}"
+    raise FlightFailedError("\n".join([first, *lines]))
 
 
-def _kept(
-    item: pytest.Item, scenario: Scenario, judged: JudgedFlight
-) -> Sequence[tuple[str, Path]]:
-    """Writes the log of a failed flight, which is flown again for it, and a map of its paths."""
+def _kept(item: pytest.Item, scenario: Scenario, judged: JudgedFlight) -> Sequence[tuple[str, str]]:
+    """Writes the scenario of a failed flight, its log and a map of its paths.
+
+    Returns their paths and the command that repeats the flight. It is flown again for the log.
+    """
     from volery.cluster.single_runs import SingleRun
     from volery.runtime.flight_recorder import DEFAULT_RATE_HZ
     from volery.verdicts.failure_map import failure_png
-    from volery.verdicts.judging import Judge
+    from volery.verdicts.judging import Judge, final_s
 
     folder: Path = item.config.rootpath / item.config.getoption("--volery-out")
     folder.mkdir(parents=True, exist_ok=True)
     name = _UNSAFE.sub("_", item.nodeid).strip("_")[-120:]
-    log, image = folder / f"{name}.mcap", folder / f"{name}.png"
+    file, log, image = (folder / f"{name}{end}" for end in (".toml", ".mcap", ".png"))
     judge = Judge(scenario)
     with SingleRun(scenario, DEFAULT_RATE_HZ, log, judge.needs, judge) as run:
         run.fly()
-    image.write_bytes(failure_png(judged.flight, judged.verdicts))
-    return (("log", log), ("image", image))
+    image.write_bytes(failure_png(judged.flight, judged.verdicts, scenario.expect))
+    scenario.save(file, overwrite=True)
+    end_s = final_s(judged.verdicts, scenario.expect) + 1.0
+    seconds = f" --seconds {end_s:.1f}" if end_s < scenario.duration_s else ""
+    replay = f"volery run {shlex.quote(str(file))}{seconds} --trust --page"
+    return (("replay", replay), ("log", str(log)), ("image", str(image)))

@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from volery.scenario.load import load_scenario
+from volery.verdicts import judged_flight
+
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario_tests.md").read_text("utf-8")
 PASSES = "always(speed < 3)"
 
@@ -82,3 +85,20 @@ def test_flights_that_fail_leave_what_is_uploaded(steps, checkout):
         assert files, pattern
         kinds |= {path.suffix for path in files}
     assert {".xml", ".mcap", ".png"} <= kinds
+
+
+def test_functions_of_the_document_judge_its_flight(checkout):
+    expectations = re.findall(
+        r'^```toml\n(\[\[expect\]\]\nkind = "predicate"\n.*?)^```', PAGE, re.DOTALL | re.M
+    )
+    functions = re.findall(
+        r"^```python\n((?:import numpy.*?)?^def .*?)^```", PAGE, re.DOTALL | re.M
+    )
+    assert (len(expectations), len(functions)) == (2, 2)
+    folder = checkout / "scenarios"
+    (folder / "own_checks.py").write_text("".join(functions), encoding="utf-8")
+    file = folder / "hop.toml"
+    file.write_text("\n".join([file.read_text("utf-8"), *expectations]), encoding="utf-8")
+    verdicts = judged_flight(load_scenario(file, trust=True)).verdicts
+    assert [verdict.outcome for verdict in verdicts] == ["passed"] * 5
+    assert [0.0 < verdict.margin < 5.0 for verdict in verdicts[3:]] == [True, True]

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from typer.testing import CliRunner
+
+from volery.cli.app import app
 
 HOP = """
 name = "hop"
@@ -28,7 +34,6 @@ at_most_m_s = 5.0
 @pytest.fixture
 def suite(tmp_path):
     """A folder of tests, and what runs pytest in it."""
-    (tmp_path / "conftest.py").write_text('pytest_plugins = ["volery.pytest_plugin"]\n')
 
     def run(*words):
         return subprocess.run(
@@ -55,10 +60,26 @@ def test_scenario_files_are_tests(suite):
     assert "Traceback" not in done.stdout
     cases = ElementTree.parse(suite.folder / "out.xml").getroot().iter("testcase")
     kept = [p.get("value") for case in cases for p in case.iter("property")]
-    assert sorted(path.rpartition(".")[2] for path in kept) == ["mcap", "mcap", "png", "png"]
-    from pathlib import Path
+    files = [Path(value) for value in kept if not value.startswith("volery run ")]
+    assert sorted(file.suffix for file in files) == [".mcap", ".mcap", ".png", ".png"]
+    assert all(file.stat().st_size > 1000 for file in files)
 
-    assert all(Path(path).stat().st_size > 1000 for path in kept)
+
+def test_a_failed_flight_can_be_repeated(suite):
+    (suite.folder / "slow_test.toml").write_text(HOP.replace("5.0", "0.1"))
+    done = suite("--volery-seeds", "1")
+    replay = re.search(r"replay +volery (run .*) --page", done.stdout)[1]
+    again = CliRunner().invoke(app, [*shlex.split(replay), "--fail-on", "expectation"])
+    assert again.exit_code == 1, again.output
+    measured = re.search(r"failed +(speed .*)", done.stdout)[1]
+    assert measured in again.output
+
+
+def test_the_plugin_may_be_named_and_switched_off(suite):
+    (suite.folder / "test_hop.toml").write_text(HOP)
+    assert "no tests ran" in suite("-p", "no:volery.pytest_plugin").stdout
+    (suite.folder / "conftest.py").write_text('pytest_plugins = ["volery.pytest_plugin"]\n')
+    assert "1 passed" in suite().stdout
 
 
 def test_the_fixture_flies_with_each_seed(suite):
@@ -78,14 +99,27 @@ def test_the_fixture_flies_with_each_seed(suite):
     )
     done = suite()
     assert "1 failed, 4 passed" in done.stdout, done.stdout
-    assert "FlightFailedError" in done.stdout
     assert "failed  speed <= 0.1 m/s" in done.stdout
+    (summary,) = re.findall(r"FAILED test_hops.py::test_it_is_slow - (.*)", done.stdout)
+    assert "FlightFailedError: hop, seed 1: speed <= 0.1 m/s: " in summary
+    assert "_check(request.node" not in done.stdout  # no lines of the plugin
+
+
+def test_an_unknown_scenario_has_the_nearest_name(suite):
+    (suite.folder / "test_hoover.py").write_text("def test_it(flight):\n    flight('hoover')\n")
+    done = suite()
+    assert "no scenario 'hoover'; did you mean 'hover'?" in done.stdout
+    assert "pytest_plugin.py" not in done.stdout
 
 
 def test_a_file_that_cannot_be_read_is_a_collection_error(suite):
     (suite.folder / "test_bad.toml").write_text(HOP.replace("no_contact", "no_contacts"))
     (suite.folder / "test_empty.toml").write_text(HOP[: HOP.index("[[expect]]")])
+    (suite.folder / "test_other.toml").write_text("[tool]\n")
+    (suite.folder / "test_broken.toml").write_text(HOP.replace("= 1.5", "="))
     done = suite()
     assert done.returncode == 2
     assert "did you mean 'no_contact'?" in done.stdout
     assert "expects nothing: add [[expect]]" in done.stdout
+    assert "test_broken.toml: not valid TOML" in done.stdout
+    assert "3 errors" in done.stdout

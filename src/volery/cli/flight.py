@@ -150,7 +150,8 @@ class CommandLineFlight:
                 self._await_clients()
                 self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
             self._wall_s = self._wall_since(start)
-            verdicts = self._checks.judge(self._wall_s)
+            is_whole = self._options.seconds is None or "expectation" in self._options.fail_on
+            verdicts = self._checks.judge(self._wall_s, is_over=is_whole)
             self._log_verdicts()
         except _StoppedError:
             code, problem = stopped_code(), f"Stopped {stopped_how()}"
@@ -158,7 +159,7 @@ class CommandLineFlight:
             code, problem = USER_ERROR, "The log could not be written"
             complain(str(error))
         except VoleryError as error:
-            code, problem = USER_ERROR, "The flight ended with an error"
+            code, problem = self._checks.code_of(error), "The flight ended with an error"
             complain_of(error)
         finally:
             self._wall_s = self._wall_s or self._wall_since(start)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from volery.core.errors import ScenarioError
+from volery.cli.error_reporting import USER_ERROR
+from volery.core.errors import NodeError, ScenarioError, VoleryError
 
 if TYPE_CHECKING:
     from volery.graph.messages import Published
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from volery.verdicts.verdict import Verdict
 
 FAILED = 1
-"""Exit code of a flight that went through, but failed."""
-_KINDS = ("crash", "contact", "expectation")
+"""Exit code of a flight that failed."""
+_KINDS = ("crash", "contact", "expectation", "node-error")
 _CONTACTS = ("impact", "collision")
 
 
@@ -51,19 +52,25 @@ class FlightChecks:
         if self._live is not None:
             self._live.look()
 
-    def judge(self, wall_s: float | None = None) -> tuple[Verdict, ...]:
+    def judge(self, wall_s: float | None = None, *, is_over: bool = True) -> tuple[Verdict, ...]:
         """Ends the recording, publishes the verdicts and returns them.
 
-        wall_s: wall time of the flight, s; None: that since its start or last reset.
+        wall_s: wall time of the flight, s; None: that since its start or last reset. is_over:
+        whether the flight went to its end, as in `Judge.verdicts`.
         """
         if self._live is not None:
-            self._verdicts = self._live.finish(wall_s)
+            self._verdicts = self._live.finish(wall_s, is_over=is_over)
         return self._verdicts
 
     @property
     def message(self) -> Published | None:
         """The verdicts as a message for the log; None without expectations."""
         return None if self._live is None else self._live.last
+
+    def code_of(self, error: VoleryError) -> int:
+        """Returns the exit code of a flight that an error has ended."""
+        fails = isinstance(error, NodeError) and "node-error" in self._kinds
+        return FAILED if fails else USER_ERROR
 
     def failures(self) -> list[str]:
         """Returns what has failed, a line each."""

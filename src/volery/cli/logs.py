@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from volery.cli.error_reporting import complain, warn
 from volery.cli.tables import print_table
@@ -13,12 +15,15 @@ from volery.core.plurals import counted
 from volery.core.whole_files import new_partial, put_in_place
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag", "ros2bag": "ROS 2 bag", "ulog": "ULog"}
+VERDICTS = "/volery/verdicts"
 _RECOVERED = ("mcap", "bag")
 """Formats that `volery recover` reads."""
 
 
 def show_log(path: Path) -> bool:
     """Prints the contents of a log; returns False, after one line on stderr, if the log is damaged.
+
+    The verdicts on the flight follow, if the log has them.
 
     Raises `RecordingError` if the file is no log.
     """
@@ -34,11 +39,28 @@ def show_log(path: Path) -> bool:
     if rows:
         echo_line("")
         print_table(("topic", "type", "messages", "rate"), rows, right=(2, 3))
+    if any(topic.topic == VERDICTS for topic in summary.topics):
+        _print_verdicts(path)
     if summary.problem:
         recovery = f"; `volery recover {path}` writes what is readable"
         complain(f"{path}: {summary.problem}{recovery if summary.format in _RECOVERED else ''}")
         return False
     return True
+
+
+def _print_verdicts(path: Path) -> None:
+    """Prints the last verdicts of a log; of a damaged one, those that can be read."""
+    from volery.logs import open_log
+    from volery.verdicts.live_verdicts import verdicts_of
+
+    last: Any = None
+    with open_log(path) as log, suppress(RecordingError):
+        for logged in log.messages(VERDICTS):
+            last = logged.message
+    if last is not None:
+        echo_line("")
+        for verdict in verdicts_of(last.data):
+            echo_line(f"{verdict.outcome!s:7} {verdict.describe()}")
 
 
 def recover_log(path: Path, out: Path | None) -> None:

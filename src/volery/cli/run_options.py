@@ -36,9 +36,9 @@ WaitTimeout = Annotated[
 FailOn = Annotated[
     list[str] | None,
     flight_option(
-        metavar="crash|contact|expectation[,..]",
-        help="Exit with 1 if a UAV has crashed at the end, if one hit anything, or if the scenario "
-        "expected something else, repeatable.",
+        metavar="crash|contact|expectation|node-error[,..]",
+        help="Exit with 1 if a UAV has crashed at the end, if one hit anything, if the scenario "
+        "expected something else, or if a node failed, repeatable.",
     ),
 ]
 ReplayCommands = Annotated[

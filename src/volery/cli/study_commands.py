@@ -142,7 +142,7 @@ def judge(
     if search is None:
         passed = report_tests(options, junit, as_json=as_json)
     else:
-        passed = report_search(options, search, sampler, as_json=as_json)
+        passed = report_search(options, search, sampler, junit, as_json=as_json)
     if not passed:
         raise typer.Exit(1)
 

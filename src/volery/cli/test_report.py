@@ -10,14 +10,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from volery.cli.scenario_tests import (
-    SearchedScenario,
-    TestedFlight,
-    TestedScenario,
-    TestOptions,
-    run_tests,
-    search_failures,
-)
+from volery.cli.scenario_searches import SearchedScenario, search_failures
+from volery.cli.scenario_tests import TestedFlight, TestedScenario, TestOptions, run_tests
 from volery.cli.terminal import echo_line, echo_lines
 from volery.core.errors import ScenarioError, reason_of
 from volery.core.plurals import counted
@@ -43,39 +37,49 @@ def report_tests(options: TestOptions, junit: Path | None, *, as_json: bool) -> 
     else:
         print_summary(finished, time.monotonic() - start)
     if junit is not None:
-        try:
-            junit.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(junit, junit_of(finished))
-        except OSError as error:
-            raise ScenarioError(f"{junit}: cannot be written: {reason_of(error)}") from None
+        _write_junit(junit, finished)
     return not any(tested.failed for tested in finished)
 
 
-def report_search(options: TestOptions, flights: int, sampler: str, *, as_json: bool) -> bool:
-    """Searches failures and reports them; returns whether none was found."""
+def report_search(
+    options: TestOptions, flights: int, sampler: str, junit: Path | None, *, as_json: bool
+) -> bool:
+    """Searches failures and reports them; returns whether none was found.
+
+    junit: file of JUnit XML; None: none. Raises `ScenarioError` as `report_tests`.
+    """
     searched = search_failures(options, flights, sampler)
+    if junit is not None:
+        _write_junit(junit, [each.tested for each in searched])
     if as_json:
         echo_lines(json.dumps([_searched(each) for each in searched], indent=1))
-        return not any(each.failure for each in searched)
-    for each in searched:
-        flown = counted(each.flights, "flight")
-        if each.failure is None:
-            echo_line(f"{each.path}: no failure in {flown}")
-            continue
-        echo_line(f"{each.path}: a failure after {flown}")
-        _print_failure(each.path, each.failure)
-        echo_line(f"  saved   {each.file}")
-    return not any(each.failure for each in searched)
+    else:
+        for each in searched:
+            _print_search(each)
+    return not any(each.tested.failed for each in searched)
+
+
+def _print_search(searched: SearchedScenario) -> None:
+    path, (flight,) = searched.tested.path, searched.tested.flights
+    flown = counted(searched.flights, "flight")
+    if searched.file is not None:
+        echo_line(f"{path}: a failure after {flown}")
+        _print_failure(path, flight)
+        echo_line(f"  saved   {searched.file}")
+        return
+    echo_line(f"{path}: no failure in {flown}; nearest to one: {_origin(flight)}")
+    for margin, unit, name in _margins(flight):
+        echo_line(f"  {margin:9.3g} {unit:4} {name}")
 
 
 def _searched(searched: SearchedScenario) -> dict[str, Any]:
-    failure = None if searched.failure is None else _plain(searched.failure)
-    file = None if searched.file is None else str(searched.file)
+    flight = _plain(searched.tested.flights[0])
     return {
-        "scenario": searched.path,
+        "scenario": searched.tested.path,
         "flights": searched.flights,
-        "failure": failure,
-        "file": file,
+        "failure": None if searched.file is None else flight,
+        "nearest": flight if searched.file is None else None,
+        "file": None if searched.file is None else str(searched.file),
     }
 
 
@@ -142,6 +146,14 @@ def junit_of(all_tested: Sequence[TestedScenario]) -> bytes:
     return text
 
 
+def _write_junit(path: Path, all_tested: Sequence[TestedScenario]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, junit_of(all_tested))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
+
+
 def _add_case(
     suite: ElementTree.Element, tested: TestedScenario, flight: TestedFlight, verdict: Verdict
 ) -> None:
@@ -163,12 +175,17 @@ def _add_case(
 
 
 def _print_failure(path: str, flight: TestedFlight) -> None:
-    changes = "".join(f", {key} = {value}" for key, value in flight.changes.items())
-    echo_line(f"FAILED {path}, seed {flight.seed}{changes}")
+    echo_line(f"FAILED {path}, {_origin(flight)}")
     for verdict in flight.verdicts or [_ended(flight)]:
         echo_line(f"  {verdict.outcome!s:7} {verdict.describe()}")
     for hint in _hints(flight):
         echo_line(f"  {hint}")
+
+
+def _origin(flight: TestedFlight) -> str:
+    """Returns the seed and the values of a flight."""
+    changes = (f"{key} = {value}" for key, value in flight.changes.items())
+    return ", ".join([f"seed {flight.seed}", *changes])
 
 
 def _hints(flight: TestedFlight) -> list[str]:
@@ -178,7 +195,7 @@ def _hints(flight: TestedFlight) -> list[str]:
 
 def _ended(flight: TestedFlight) -> Verdict:
     """Returns the verdict on a flight that ended with an error."""
-    return Verdict("flight", "flight", Outcome.ERROR, flight.result.error)
+    return Verdict.of_flight(flight.result.error)
 
 
 def _outcome(flight: TestedFlight) -> Outcome:
@@ -191,11 +208,16 @@ def _outcome(flight: TestedFlight) -> Outcome:
 def _min_margins(tested: TestedScenario) -> dict[str, tuple[float, str, int]]:
     smallest: dict[str, tuple[float, str, int]] = {}
     for flight in tested.flights:
-        for verdict in flight.verdicts:
-            known = smallest.get(verdict.name, (math.inf, "", 0))
-            if verdict.margin < known[0]:
-                smallest[verdict.name] = (verdict.margin, verdict.unit, flight.seed)
+        for margin, unit, name in _margins(flight):
+            if margin < smallest.get(name, (math.inf, "", 0))[0]:
+                smallest[name] = (margin, unit, flight.seed)
     return smallest
+
+
+def _margins(flight: TestedFlight) -> list[tuple[float, str, str]]:
+    """Returns the margins of a flight's expectations that have one, with unit and name."""
+    verdicts = [verdict for verdict in flight.verdicts if math.isfinite(verdict.margin)]
+    return [(verdict.margin, verdict.unit, verdict.name) for verdict in verdicts]
 
 
 def _plain(flight: TestedFlight) -> dict[str, Any]:

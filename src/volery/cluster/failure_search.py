@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -92,17 +92,15 @@ class TpeSampler:
 
 
 @dataclass(frozen=True)
-class FoundFailure:
-    """A flight that fails."""
+class FoundFlight:
+    """A flight of a search."""
 
-    values: Mapping[str, Any]
-    """Values of the study's parameters that it needs; others are those of the scenario."""
-    seed: int
-    """Seed of the scenario."""
+    run: RunSpec
+    """Its seed, and values of the parameters that it needs; others are those of the scenario."""
     result: RunResult
     """Its result."""
     flights: int
-    """Flights of the search up to it."""
+    """Flights of the search when it was found."""
 
 
 class FailureSearch:
@@ -130,9 +128,12 @@ class FailureSearch:
         """Number of values that a sampler proposes: one a variation, and one for the seed."""
         return len(self._variations) + (self._seeds[0] < self._seeds[1])
 
-    def search(self, sampler: Sampler, flights: int) -> FoundFailure | None:
-        """Returns the first failure within a number of flights; None: none failed."""
-        flown = 0
+    def search(self, sampler: Sampler, flights: int) -> FoundFlight:
+        """Returns the first failure within a number of flights.
+
+        If all pass, the flight with the least margin. flights: 1 or more.
+        """
+        flown, closest, min_rating = 0, None, math.inf
         while flown < flights:
             count = min(self._executor.num_workers, flights - flown)
             points = sampler.propose(count)
@@ -140,36 +141,34 @@ class FailureSearch:
             results = self._fly(runs)
             for k, (run, result) in enumerate(zip(runs, results, strict=True)):
                 if not result.is_passed:
-                    return FoundFailure(run.values, run.seed, result, flown + k + 1)
-            sampler.learn([self._rating(result) for result in results])
+                    return FoundFlight(run, result, flown + k + 1)
+            ratings = [self._rating(result) for result in results]
+            sampler.learn(ratings)
             flown += count
+            k = int(np.argmin(ratings))
+            if closest is None or ratings[k] < min_rating:
+                closest, min_rating = FoundFlight(runs[k], results[k], flown), ratings[k]
             self._on_flight(flown)
-        return None
+        assert closest is not None
+        return closest
 
-    def simplified(self, found: FoundFailure) -> FoundFailure:
-        """Returns a failure with fewer and smaller changes.
+    def simplified(self, found: FoundFlight) -> FoundFlight:
+        """Returns a failure with fewer and simpler changes.
 
         Each value is left out if the flight fails without it, or else is moved towards the low end
-        of its range as far as it still fails.
+        of its range as far as it still fails, and rounded.
         """
-        values = dict(found.values)
         for number, variation in enumerate(self._variations):
             name = variation.name(number)
-            without = {key: value for key, value in values.items() if key != name}
+            without = {key: value for key, value in found.run.values.items() if key != name}
             fails = self._failing(without, found)
-            if fails is not None:
-                values, found = without, fails
-                continue
-            passing, failing = variation.low, variation.number(values[name])
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (passing + failing)
-                changed = {**values, name: variation.value(middle)}
-                fails = self._failing(changed, found)
-                if fails is None:
-                    passing = middle
-                else:
-                    failing, values, found = middle, changed, fails
+            found = self._lowered(variation, name, found) if fails is None else fails
         return found
+
+    def recorded(self, found: FoundFlight) -> FoundFlight:
+        """Flies a failure again and returns it with its log."""
+        (result,) = self._fly([found.run], record=True)
+        return replace(found, result=result)
 
     # ------------------------------------------------------------------------------------- inside
 
@@ -187,20 +186,44 @@ class FailureSearch:
         identity = hashlib.sha256(json.dumps([values, seed], sort_keys=True).encode()).hexdigest()
         return RunSpec(identity[:24], 0, 0, dict(values), seed)
 
-    def _failing(self, values: Mapping[str, Any], found: FoundFailure) -> FoundFailure | None:
-        (result,) = self._fly([self._run(values, found.seed)])
-        if result.is_passed:
-            return None
-        return FoundFailure(values, found.seed, result, found.flights)
+    def _lowered(self, variation: Variation, name: str, found: FoundFlight) -> FoundFlight:
+        """Returns a failure with the lowest value of a parameter that still fails, rounded."""
 
-    def _fly(self, runs: Sequence[RunSpec]) -> list[RunResult]:
+        def failing_with(number: float) -> FoundFlight | None:
+            values = {**found.run.values, name: variation.value(number)}
+            return self._failing(values, found)
+
+        lowest = failing_with(variation.low)
+        if lowest is not None:
+            return lowest
+        passing, failing = variation.low, variation.number(found.run.values[name])
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (passing + failing)
+            fails = failing_with(middle)
+            if fails is None:
+                passing = middle
+            else:
+                failing, found = middle, fails
+        for rounded in variation.rounded(failing):
+            fails = failing_with(rounded)
+            if fails is not None:
+                return fails
+        return found
+
+    def _failing(self, values: Mapping[str, Any], found: FoundFlight) -> FoundFlight | None:
+        """Returns the failure with other values; None: the flight passes."""
+        run = self._run(values, found.run.seed)
+        (result,) = self._fly([run])
+        return None if result.is_passed else replace(found, run=run, result=result)
+
+    def _fly(self, runs: Sequence[RunSpec], *, record: bool = False) -> list[RunResult]:
         """Flies runs, one for each worker, and returns their results in their order."""
         waiting: dict[int, RunSpec] = {}
         results: dict[str, RunResult] = {}
         for run in runs:
             self._number += 1
             waiting[self._number] = run
-            self._executor.submit(RunBatch(self._number, (run,)))
+            self._executor.submit(RunBatch(self._number, (run,), record=record))
             if not self._executor.can_submit():
                 self._collect(waiting, results)
         while waiting:

@@ -143,7 +143,7 @@ class RunWorker:
                 flown = flight.fly()
                 result = self._measured(run, flown, kept)
             if keeps_log and judge is not None and not result.is_passed:
-                image = failure_png(flown.flight, flown.verdicts)
+                image = failure_png(flown.flight, flown.verdicts, chosen.expect)
                 (self._job.results / f"{run.id}.png").write_bytes(image)
         except Exception as error:
             if _is_disk_full(error):

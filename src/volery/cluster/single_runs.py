@@ -43,7 +43,8 @@ class SingleRun:
     def fly(self) -> FinishedRun:
         """Flies to the end; the simulation stays open. Raises what ends the flight early.
 
-        The verdicts are in the log, unless one needs the log itself.
+        The verdicts are in the log, unless one needs the log itself; of a flight that ends early,
+        that it has failed.
         """
         simulation, judge = self._simulation, self._judge
         verdicts: tuple[Verdict, ...] = ()
@@ -52,7 +53,13 @@ class SingleRun:
             RunRecorder(simulation, self._needs, self._rate_hz) as recorder,
             _recorded(simulation, self._log) as log,
         ):
-            simulation.run()
+            try:
+                simulation.run()
+            except Exception as error:
+                if judge is not None and log is not None:
+                    ended = Verdict.of_flight(f"{type(error).__name__}: {error}")
+                    log.write(verdicts_message([ended], simulation.time_s, is_over=True))
+                raise
             wall_s = time.perf_counter() - start
             if judge is not None and "log" not in self._needs:
                 verdicts = judge.verdicts(recorder.finished(wall_s))

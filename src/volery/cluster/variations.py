@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -35,6 +36,8 @@ class Variation:
             low, high = float(found["low"]), float(found["high"])
         except ValueError:
             raise StudyError(f"--vary: KEY=LOW:HIGH, such as wind=0:6, not '{text}'") from None
+        if found["key"] == "seed":
+            raise StudyError("--vary seed: --seeds N --first-seed M varies the seed")
         if not low < high:
             raise StudyError(f"--vary {text}: {low:g} must be below {high:g}")
         return cls(found["key"], low, high)
@@ -55,6 +58,12 @@ class Variation:
     def at(self, part: float) -> float:
         """Returns the value at a part of the range, 0 to 1."""
         return self.low + part * (self.high - self.low)
+
+    def rounded(self, number: float) -> list[float]:
+        """Returns a number rounded to a tenth, hundredth and thousandth of the range's size."""
+        digits = 1 - math.floor(math.log10(self.high - self.low))
+        found = [round(number, digits + more) for more in range(3)]
+        return [each for each in found if self.low <= each <= self.high]
 
     def number(self, value: Any) -> float:
         """Returns the number that `value` was made of."""

@@ -58,6 +58,8 @@ def find_submissions(path: Path) -> list[Submission]:
     none. Raises `ScenarioError` without any.
     """
     if path.is_file():
+        if path.suffix != ".py":
+            raise ScenarioError(f"{path}: a submission is a .py file, or a folder with {MODULE}.py")
         return [Submission(path.stem, path)]
     if not path.is_dir():
         raise ScenarioError(f"{path}: no such file or folder")

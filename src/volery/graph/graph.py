@@ -322,7 +322,8 @@ class Graph:
         published = Published(sender.topic, sender.msgtype, self._now_ns(), message)
         with self._members:
             topic = self._topics.get(sender.topic)
-            callbacks = (*self._to_all, *(topic.external if topic is not None else ()))
+            recorders = (c for c in self._to_all if c.matches(sender.topic))
+            callbacks = (*recorders, *(topic.external if topic is not None else ()))
         for callback in callbacks:
             callback(published)
 

@@ -9,7 +9,7 @@ nodes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from volery.core.errors import DataFileError
@@ -27,6 +27,8 @@ class ScenarioAccess:
 
     folder: Path | None = None
     """Base folder of relative names; None: the working folder."""
+    code_folder: Path | None = None
+    """Folder of local modules; None: `folder`."""
     is_confined: bool = False
     """Whether only files below `folder` and shipped data are read, and only shipped nodes start."""
     is_trusted: bool = True
@@ -35,6 +37,21 @@ class ScenarioAccess:
     """File names that a confined scenario has in common with a user's own file: not confined."""
     own_nodes: frozenset[str] = frozenset()
     """Nodes, as files name them, that a confined scenario has in common with a user's own file."""
+
+    @property
+    def module_folders(self) -> tuple[Path, ...]:
+        """Folders of local modules: the scenario's and the working folder."""
+        folder = self.folder if self.code_folder is None else self.code_folder
+        return (Path(),) if folder is None else (folder, Path())
+
+    def with_code_in(self, name: str | None) -> ScenarioAccess:
+        """Returns the access with local modules in a folder, relative to the scenario's.
+
+        None: in the scenario's folder; always so for a confined scenario.
+        """
+        if name is None or self.is_confined:
+            return self if self.code_folder is None else replace(self, code_folder=None)
+        return replace(self, code_folder=(self.folder or Path()) / name)
 
     def find_file(self, name: str, shipped: Path | None = SHIPPED_DATA) -> Path:
         """Returns the path of a file: in the scenario's folder, the working folder or shipped data.

@@ -5,6 +5,7 @@ They change nothing in the flight; `volery.verdicts` judges it by them.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self, TypeAlias
@@ -45,13 +46,13 @@ class _Expectation(Data):
             words += f" ({', '.join(self.uavs)})"
         return words
 
-    def may_recover(self, time_s: float) -> bool:
-        """Returns whether a flight that fails at a simulated time, s, may still pass.
+    def decided_s(self, moment_s: float) -> float:  # noqa: ARG002
+        """Returns the simulated time, s, from which a failure is final; inf: the end of the flight.
 
-        This is so for what is to happen once, and for what is judged by the whole flight.
+        moment_s: the moment that the verdict gives, s.
         """
         by_s: float | None = getattr(self, "by_s", None)
-        return by_s is None or time_s < by_s
+        return math.inf if by_s is None else by_s
 
     def _words(self) -> str:
         return str(getattr(self, "kind", ""))
@@ -60,9 +61,9 @@ class _Expectation(Data):
 class _Always(_Expectation):
     """An expectation that holds throughout the flight."""
 
-    def may_recover(self, time_s: float) -> bool:  # noqa: ARG002
-        """Returns False: it has failed for good."""
-        return False
+    def decided_s(self, moment_s: float) -> float:
+        """Returns the moment: it has failed for good."""
+        return moment_s
 
 
 class _Windowed(_Always):
@@ -227,9 +228,9 @@ class TopicRateExpectation(_Windowed):
     window_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 1.0
     """Length of the windows, which follow each other."""
 
-    def may_recover(self, time_s: float) -> bool:
-        """Returns whether the first window is not over yet."""
-        return time_s < self.from_s + self.window_s
+    def decided_s(self, moment_s: float) -> float:
+        """Returns the end of the window that begins at the moment."""
+        return moment_s + self.window_s
 
     def _words(self) -> str:
         return f"{self.topic} >= {self.at_least_hz:g} Hz"
@@ -263,9 +264,11 @@ class TopicValueExpectation(_Windowed):
             _check_order((self.at_least, self.at_most), "at_least and at_most")
         return self
 
-    def may_recover(self, time_s: float) -> bool:
-        """Returns whether a value can still come that passes."""
-        return self.when != "always" and (self.until_s is None or time_s < self.until_s)
+    def decided_s(self, moment_s: float) -> float:
+        """Returns the time after which no value can come that passes."""
+        if self.when == "always":
+            return moment_s
+        return math.inf if self.until_s is None else self.until_s
 
     def _words(self) -> str:
         parts = [f"= {self.equals}"] if self.equals is not None else []
@@ -361,6 +364,9 @@ class PredicateExpectation(_Expectation):
     study; it returns whether the flight passes, or the margin."""
     parameters: dict[str, Any] = Field(default_factory=dict)
     """Further arguments of the function."""
+    topics: tuple[_Path, ...] = ()
+    """Topics whose messages the function reads, as `topics`: absolute ones, or ones below each
+    UAV's namespace."""
 
     def _words(self) -> str:
         return self.function

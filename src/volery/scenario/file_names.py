@@ -7,7 +7,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-_KEYS = ("airframe", "field", "file", "identified_model", "message_packages", "model")
+_KEYS = (
+    "airframe",
+    "code_folder",
+    "field",
+    "file",
+    "identified_model",
+    "message_packages",
+    "model",
+)
 """Keys that name files, or parts that are shipped or in files."""
 
 

@@ -100,11 +100,15 @@ Formula: TypeAlias = Comparison | Connective | Temporal
 
 def parse_formula(text: str) -> Formula:
     """Returns a formula. Raises `ValueError`, saying what is wrong, for another text."""
+    line = " ".join(text.split())
     try:
-        tree = ast.parse(" ".join(text.split()), mode="eval")
-    except (SyntaxError, RecursionError, MemoryError) as error:
-        reason = getattr(error, "msg", None) or "it is nested too deeply"
-        raise ValueError(f"the formula cannot be read: {reason}") from None
+        tree = ast.parse(line, mode="eval")
+    except (RecursionError, MemoryError):
+        raise ValueError("the formula is nested too deeply") from None
+    except SyntaxError as error:
+        rest = line[max(0, (error.offset or 1) - 1) :][:30]
+        where = f"at '{rest}'" if rest else "at its end"
+        raise ValueError(f"the formula cannot be read {where}: {error.msg}") from None
     if sum(1 for _ in ast.walk(tree)) > _MAX_NODES:
         raise ValueError("the formula is too long")
     return _formula(tree.body)

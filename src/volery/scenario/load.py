@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,19 @@ def load_scenario(
         raise ScenarioError(f"{path}: not valid TOML: {error}") from None
     access = ScenarioAccess(path.parent, is_confined=confined, is_trusted=trust and not confined)
     return parse_scenario(data, where=str(path), access=access)
+
+
+def has_tables(path: Path, *names: str) -> bool:
+    """Returns whether a file seems to be a scenario with these arrays of tables, such as `expect`.
+
+    It need not be valid: a scenario with a fault is one, too. False for a file that cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return False
+    wanted = (rf"^[ \t]*(\[\[[ \t]*{name}[ \t]*\]\]|{name}[ \t]*=)" for name in ("uavs", *names))
+    return all(re.search(pattern, text, re.MULTILINE) for pattern in wanted)
 
 
 def list_scenarios() -> list[str]:

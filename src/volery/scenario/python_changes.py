@@ -20,6 +20,7 @@ from volery.scenario.uav_types import with_airframe
 _Data = dict[str, Any]
 _FIRST = re.compile(r"[^.\[\]]+")
 """First key of a path."""
+_KEY_OF_TYPE = re.compile(r"types\.([^.\[\]]+)\.")
 
 
 def split_changes(
@@ -45,6 +46,7 @@ def with_keys(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -
     result = merged(data, names)
     for path, value in changes.items():
         if path not in names:
+            _check_type(path, result.get("types", {}), where)
             result = with_key(result, path, value, where)
     plain: _Data = _plain(result)
     return plain
@@ -73,6 +75,15 @@ def _check_key(key: Any, known: Collection[str], where: str) -> None:
     names = sorted({*known, *_SHORT_FORMS})
     hint = near_miss(first[0], names)
     raise ScenarioError(f"{where}: unknown key '{key}'{hint} Allowed here: {', '.join(names)}")
+
+
+def _check_type(path: str, types: Mapping[str, Any], where: str) -> None:
+    """Raises `ScenarioError` for a key of a type that the scenario lacks: no UAV would have it."""
+    found = _KEY_OF_TYPE.match(path)
+    if found is not None and found[1] != "*" and found[1] not in types:
+        hint = near_miss(found[1], types)
+        known = ", ".join(sorted(types))
+        raise ScenarioError(f"{where}: key '{path}': no type '{found[1]}'{hint} Types: {known}")
 
 
 def _is_short(key: str, value: Any) -> bool:

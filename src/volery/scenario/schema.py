@@ -20,6 +20,7 @@ from volery.scenario.base import Data, Name
 from volery.scenario.expectations import Expectation
 from volery.scenario.faults import Fault
 from volery.scenario.file_names import moved
+from volery.scenario.node_names import node_module
 from volery.scenario.python_changes import split_changes, with_keys, with_short_forms
 from volery.scenario.radio import Radio
 from volery.scenario.sensors import (
@@ -109,6 +110,8 @@ class Scenario(Data):
     """What a flight is expected to do; `volery test` and `volery.verdicts` judge it."""
     message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
+    code_folder: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """Folder of the scenario's own modules: nodes and predicates; None: that of its file."""
 
     _access: ScenarioAccess = PrivateAttr(default_factory=ScenarioAccess)
 
@@ -189,7 +192,8 @@ class Scenario(Data):
         """Writes a TOML file, which `load_scenario` loads to an equal scenario.
 
         Its first line names `scenario.schema.json` for editors; `volery schema` writes that. Names
-        of files in this scenario's folder become relative to the new file's folder. A saved
+        of files in this scenario's folder become relative to the new file's folder; if its own
+        modules are there, `code_folder` names it. A saved
         scenario of a log or an upload has, when it is loaded, the access of its new owner. Raises
         `ScenarioError` if the file exists, unless `overwrite` is set, or cannot be written.
         """
@@ -197,6 +201,9 @@ class Scenario(Data):
         if path.suffix != ".toml":
             raise ScenarioError(f"{path}: a scenario is a .toml file; name it {path.name}.toml")
         data = self.model_dump(exclude_unset=True, exclude_none=True)
+        folder = self.access.folder or Path()
+        if folder.resolve() != path.parent.resolve() and self._has_code_in(folder):
+            data.setdefault("code_folder", ".")
         text = toml_text(moved(data, self.access.folder, path.parent))
         try:
             write_whole(path, f"{SCHEMA_DIRECTIVE}\n\n{text}", overwrite=overwrite)
@@ -220,7 +227,7 @@ class Scenario(Data):
     def with_access(self, access: ScenarioAccess) -> Scenario:
         """Returns the same scenario with another access."""
         changed = self.model_copy()
-        changed._access = access
+        changed._access = access.with_code_in(self.code_folder)
         return changed
 
     @property
@@ -232,6 +239,13 @@ class Scenario(Data):
     def uav_count(self) -> int:
         """Number of UAVs in all groups."""
         return sum(group.count for group in self.uavs)
+
+    def _has_code_in(self, folder: Path) -> bool:
+        """Returns whether a folder has modules that nodes or predicates of this scenario name."""
+        named = [node_module(entry.node) for entry in self.node_entries]
+        named += [e.function.partition(":")[0] for e in self.expect if e.kind == "predicate"]
+        tops = {module.partition(".")[0] for module in named if module is not None}
+        return any((folder / f"{top}.py").is_file() or (folder / top).is_dir() for top in tops)
 
     def __repr__(self) -> str:
         types = ", ".join(dict.fromkeys(group.type for group in self.uavs))

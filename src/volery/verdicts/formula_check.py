@@ -3,7 +3,8 @@
 The robustness is how far a formula is from becoming false, in the unit of its signals: differences
 at comparisons, min and max over parts and times (A. Donze and O. Maler, Robust satisfaction of
 temporal logic over real-valued signals, FORMATS 2010). Windows end with the flight: what is to hold
-always need not hold later, and what is to hold eventually must hold before.
+always need not hold later, and what is to hold eventually must hold before. A window that begins
+after the end of the flight cannot be judged.
 """
 
 from __future__ import annotations
@@ -58,14 +59,26 @@ class _Robustness(NamedTuple):
 def formula(run: FinishedRun, expectation: FormulaExpectation) -> Finding:
     """Judges by the UAV with the smallest robustness."""
     parsed, worst = parse_formula(expectation.formula), Finding("", math.inf)
+    needed_s = _last_begin_s(parsed)
     for row in rows_of(run.flight, expectation):
         signals = _Signals(run.flight, int(row))
         if not len(signals.times_s):
             continue
+        lasts_s = float(signals.times_s[-1] - signals.times_s[0])
+        if needed_s > lasts_s + 0.5 * signals.period_s:
+            raise JudgmentError(
+                f"{signals.uav}: a window begins after {needed_s:g} s, the flight ends after "
+                f"{lasts_s:g} s"
+            )
         found = _evaluate(parsed, signals)
         margin, sample = float(found.value[0]), int(found.decided_at[0])
         if math.isnan(margin):
             raise JudgmentError(f"{signals.uav}: a signal of the formula is not a number")
+        if math.isinf(margin):
+            raise JudgmentError(
+                f"{signals.uav}: the robustness is infinite: a window that moves beyond the end of "
+                "the flight, a division by zero, or the separation of a UAV without others"
+            )
         if not worst.uav or margin < worst.margin:
             time_s = float(signals.times_s[sample])
             worst = Finding(f"robustness {margin:.3g}", margin, "", time_s, signals.uav)
@@ -113,6 +126,14 @@ class _Signals:
         apart = np.linalg.norm(position - position[self._row], axis=2)
         apart[self._row] = np.inf
         return np.asarray(np.where(np.isnan(apart), np.inf, apart).min(axis=0))
+
+
+def _last_begin_s(node: Formula) -> float:
+    """Returns the latest time after the start at which a window of a formula begins, s."""
+    if isinstance(node, Comparison):
+        return 0.0
+    begin_s = node.interval_s[0] if isinstance(node, Temporal) else 0.0
+    return begin_s + max(_last_begin_s(part) for part in node.parts)
 
 
 def _evaluate(node: Formula, signals: _Signals) -> _Robustness:

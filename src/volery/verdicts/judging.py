@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -104,6 +104,19 @@ class Judge:
         return Verdict.of(name, expectation.kind, finding)
 
 
+def final_s(verdicts: Iterable[Verdict], expectations: Sequence[Expectation]) -> float:
+    """Returns the simulated time, s, from which all failures of a flight are final.
+
+    inf: the end of the flight, also without verdicts.
+    """
+    times_s = [
+        math.inf if math.isnan(verdict.time_s) else expectation.decided_s(verdict.time_s)
+        for verdict, expectation in zip(verdicts, expectations, strict=False)
+        if not verdict.is_passed
+    ]
+    return max(times_s, default=math.inf)
+
+
 def _may_change(verdict: Verdict, expectation: Expectation, time_s: float) -> bool:
     """Returns whether the rest of a flight may turn a failure into a pass.
 
@@ -112,7 +125,7 @@ def _may_change(verdict: Verdict, expectation: Expectation, time_s: float) -> bo
     if verdict.is_passed:
         return False
     undecided = verdict.outcome is Outcome.ERROR or math.isnan(verdict.time_s)
-    return undecided or expectation.may_recover(time_s)
+    return undecided or time_s < expectation.decided_s(verdict.time_s)
 
 
 class _Predicate(NamedTuple):
@@ -129,6 +142,10 @@ class _Predicate(NamedTuple):
             needs = needs_of(function, expectation.parameters)
         except VoleryError as error:
             raise ScenarioError(f"{where}: {expectation.function}: {error}") from None
+        if "topics" in needs and not expectation.topics:
+            raise ScenarioError(
+                f"{where}: {expectation.function} reads topics: name them in 'topics'"
+            )
         return cls(function, needs, expectation.parameters)
 
     def judge(self, run: FinishedRun) -> Finding:

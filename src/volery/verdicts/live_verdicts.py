@@ -34,6 +34,11 @@ def verdicts_message(verdicts: Sequence[Verdict], time_s: float, *, is_over: boo
     return Published(TOPIC, String.__msgtype__, ns_from_s(time_s), String(text))
 
 
+def verdicts_of(text: str) -> list[Verdict]:
+    """Returns the verdicts of such a message's text."""
+    return [Verdict.from_data(each) for each in json.loads(text)["verdicts"]]
+
+
 class LiveVerdicts:
     """Judges a flight from now on by the expectations of its scenario, for clients and at its end.
 
@@ -67,15 +72,16 @@ class LiveVerdicts:
         flight.watchers = watchers
         self._publisher.publish_external(flight.last.message)
 
-    def finish(self, wall_s: float | None = None) -> tuple[Verdict, ...]:
+    def finish(self, wall_s: float | None = None, *, is_over: bool = True) -> tuple[Verdict, ...]:
         """Ends the recording, publishes the verdicts and returns them.
 
-        wall_s: wall time of the flight, s; None: that since this began, without pauses.
+        wall_s: wall time of the flight, s; None: that since this began, without pauses. is_over:
+        whether the flight went to its end, as in `Judge.verdicts`.
         """
         flight, time_s = self._flight, self._simulation.time_s
         flight.recorder.stop()
         run = flight.recorder.finished(self._wall_s if wall_s is None else wall_s)
-        verdicts = self._judge.verdicts(run)
+        verdicts = self._judge.verdicts(run, is_over=is_over)
         flight.last = verdicts_message(verdicts, time_s, is_over=True)
         flight.is_over, flight.judged_s = True, time_s
         if self._publisher.has_external_subscribers:

@@ -17,6 +17,7 @@ from volery.graph.nodes.logger import ROSOUT
 from volery.scenario.expectations import (
     Expectation,
     LogMessageExpectation,
+    PredicateExpectation,
     TopicRateExpectation,
     TopicValueExpectation,
 )
@@ -28,6 +29,7 @@ ESTIMATES = ("slam/pose", "slam/odom", "odom")
 """Topics of a UAV's estimated pose, the best one first."""
 MISSING = object()
 """Value of a field that a message does not have."""
+_WHOLE = "*"
 
 
 class Estimate(NamedTuple):
@@ -49,20 +51,24 @@ Estimates = Mapping[str, Estimate]
 
 @dataclass
 class TopicRecord:
-    """The messages of a topic, without their content but for some fields."""
+    """The messages of a topic, or some fields of them."""
 
     times_s: list[float] = field(default_factory=list)
     """Simulated times, s."""
     values: dict[str, list[Any]] = field(default_factory=dict)
     """Values of fields at these times, by the paths of the fields; `MISSING` without one."""
+    messages: list[Any] | None = None
+    """The messages at these times; None: only fields are kept."""
 
     def add(self, time_s: float, message: Any) -> None:
         """Adds a message; drops those of a flight that a reset or a snapshot has undone."""
         if self.times_s and self.times_s[-1] > time_s:
             kept = bisect_left(self.times_s, time_s)
-            for column in (self.times_s, *self.values.values()):
+            for column in (self.times_s, self.messages or [], *self.values.values()):
                 del column[kept:]
         self.times_s.append(time_s)
+        if self.messages is not None:
+            self.messages.append(message)
         for path, column in self.values.items():
             column.append(value_at(message, path))
 
@@ -80,7 +86,9 @@ class FlightObserver:
         """Records by topic."""
         for topic, path in _asked(expectations, tuple(simulation.uavs)):
             record = self.topics.setdefault(topic, TopicRecord())
-            if path:
+            if path == _WHOLE:
+                record.messages = []
+            elif path:
                 record.values.setdefault(path, [])
         self._poses: dict[str, list[Array]] = {}
         self._subscriptions = []
@@ -147,12 +155,18 @@ def value_at(message: Any, path: str) -> Any:
 
 
 def _asked(expectations: Sequence[Expectation], uavs: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Returns topics and paths of fields that expectations need; an empty path: no field."""
+    """Returns topics and paths of fields that expectations need.
+
+    An empty path: the times alone; `_WHOLE`: whole messages.
+    """
     found = []
     for each in expectations:
         if isinstance(each, TopicRateExpectation | TopicValueExpectation):
             path = each.field if isinstance(each, TopicValueExpectation) else ""
             found += [(topic, path) for topic in topics_of(each.topic, each.uavs or uavs)]
+        elif isinstance(each, PredicateExpectation):
+            topics = (topics_of(topic, each.uavs or uavs) for topic in each.topics)
+            found += [(topic, _WHOLE) for named in topics for topic in named]
         elif isinstance(each, LogMessageExpectation):
             found += [(ROSOUT, path) for path in ("level", "name", "msg")]
     return found

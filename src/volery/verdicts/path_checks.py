@@ -127,10 +127,12 @@ def arrives(run: FinishedRun, expectation: ArrivalExpectation) -> Finding:
 def separation(run: FinishedRun, expectation: SeparationExpectation) -> Finding:
     """Judges by the nearest two UAVs."""
     flight, rows = run.flight, rows_of(run.flight, expectation)
+    if len(flight) < 2:
+        raise JudgmentError("the flight has one UAV only")
     samples = samples_of(flight, expectation.from_s, expectation.until_s)
     pair = nearest_pair(flight, rows=rows, samples=samples)
     if not np.isfinite(pair.distance_m):
-        return Finding("no two UAVs", is_passed=True)
+        return Finding("no two UAVs at the same time", is_passed=True)
     one, other = (flight.uavs[k] for k in pair.uavs)
     text = f"{pair.distance_m:.2f} m from {other}"
     margin = pair.distance_m - expectation.at_least_m

@@ -59,6 +59,7 @@ def topic_rate(run: FinishedRun, expectation: TopicRateExpectation) -> Finding:
 
 def topic_value(run: FinishedRun, expectation: TopicValueExpectation) -> Finding:
     """Judges by the UAV whose values fit least."""
+    samples_of(run.flight, expectation.from_s, expectation.until_s)
     until_s = math.inf if expectation.until_s is None else expectation.until_s
     found = []
     for uav, topic, record in _records(run, expectation):

@@ -85,6 +85,11 @@ class Verdict:
         )
 
     @classmethod
+    def of_flight(cls, error: str) -> Verdict:
+        """Returns the verdict on a flight that ended with an error."""
+        return cls("flight", "flight", Outcome.ERROR, " ".join(error.split()))
+
+    @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Verdict:
         """Returns the verdict of `to_data`."""
         numbers = {k: math.nan if data[k] is None else data[k] for k in ("margin", "time_s")}

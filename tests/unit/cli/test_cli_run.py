@@ -67,7 +67,7 @@ def test_the_exit_code_reports_failures_that_are_asked_for(invoke: Invoke) -> No
     assert invoke(*words, "crash").exit_code == 0  # a touch that it survived
     refused = invoke(*words, "wreck")
     assert refused.exit_code == 2
-    assert "--fail-on: crash, contact, expectation, not 'wreck'" in refused.stderr
+    assert "--fail-on: crash, contact, expectation, node-error, not 'wreck'" in refused.stderr
 
 
 def test_options_reach_the_simulation(invoke: Invoke) -> None:

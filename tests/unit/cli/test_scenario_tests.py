@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -131,6 +133,56 @@ def test_values_are_drawn_for_each_seed(hop, tmp_path):
     assert failed["text"] in again.output
 
 
+def test_a_replay_goes_on_until_the_failure_is_final(hop, tmp_path):
+    """The nearest approach is at the start; the deadline, and the end, come later."""
+    arrival = '[[expect]]\nkind = "arrives"\nposition_m = [0.0, -90.0]\n'
+
+    def replay(more, *words):
+        out = "--out", tmp_path / "out"
+        done = test(hop(arrival + more), "--no-logs", *words, *out)
+        return re.search(r"replay +volery run \S+ --seed 1(.*) --page", done.output)[1]
+
+    assert replay("by_s = 1.5\n") == " --seconds 2.5"
+    assert replay("") == ""
+    assert replay("", "--seconds", 2) == " --seconds 2.0"
+    assert replay("by_s = 1.5\n" + FAST.format(limit=0.3)) == " --seconds 2.5"
+
+
+def test_files_of_a_test_are_no_tests(hop, tmp_path):
+    hop(FAST.format(limit=0.3), seconds=1.0)
+    words = "--vary", "wind=2:4", "--jobs", 1
+    first = test(".", *words)
+    assert "1 of 1 flight failed" in first.output
+    (saved,) = (tmp_path / "runs" / "test").rglob("seed_1.toml")
+    assert "1 of 1 flight failed" in test(".", *words).output
+    assert "1 of 1 flight failed" in test(saved.parent, "--no-logs", "--out", "x").output
+    test("hop.toml", "--no-logs")
+    assert not saved.exists()
+
+
+def test_saved_scenarios_find_the_code_beside_the_test(hop, tmp_path, monkeypatch):
+    path = hop('[[expect]]\nkind = "predicate"\nfunction = "own_limits:is_low"\n', name="a/b.toml")
+    (tmp_path / "a" / "own_limits.py").write_text(
+        "from limits_of_own import LIMIT\n"
+        "def is_low(flight):\n"
+        "    return LIMIT - float(flight.position_map[:, :, 2].max())\n"
+    )
+    (tmp_path / "a" / "limits_of_own.py").write_text("LIMIT = 0.5\n")
+    vary = "--vary", "wind=0:3", "--trust", "--jobs", 1, "--out", tmp_path / "out"
+    drawn = test(path, "--json", *vary)
+    (flight,) = json.loads(drawn.stdout)["scenarios"][0]["flights"]
+    searched = json.loads(test(path, "--json", "--search", 3, "--sampler", "random", *vary).stdout)
+    replays = [flight["replay"], searched[0]["failure"]["replay"]]
+    assert "found.toml" in replays[1]
+    for name in ("own_limits", "limits_of_own"):
+        monkeypatch.delitem(sys.modules, name)
+    for replay in replays[1:]:
+        words = shlex.split(replay)[1:-1]
+        again = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
+        assert again.exit_code == 1, again.output
+        assert "own_limits:is_low: -" in again.output
+
+
 def test_a_folder_holds_tests_and_other_files(hop, tmp_path):
     hop(seconds=0.5, name="suite/a.toml")
     hop(FAST.format(limit=0.01), seconds=0.5, name="suite/deep/b.toml")
@@ -201,7 +253,27 @@ def test_a_search_saves_a_scenario_that_fails(hop, tmp_path):
     assert failed["margin"] > -0.1  # the wind is hardly stronger than needed
     calm = test(path, "--vary", "wind=0:0.5", "--search", 3, "--json", *words[4:])
     assert calm.exit_code == 0
-    assert json.loads(calm.stdout)[0]["failure"] is None
+    (searched,) = json.loads(calm.stdout)
+    assert searched["failure"] is None
+    margins = [verdict["margin"] for verdict in searched["nearest"]["verdicts"]]
+    assert all(margin > 0.0 for margin in margins)
+
+
+def test_a_search_keeps_what_a_test_keeps(hop, tmp_path):
+    path, junit = hop(FAST.format(limit=0.3)), tmp_path / "out.xml"
+    words = "--vary", "wind=0:3", "--search", 3, "--sampler", "random", "--jobs", 1
+    done = test(path, *words, "--junit", junit, "--out", tmp_path / "out")
+    log, image = (re.search(rf"{kind} +(\S+)", done.output)[1] for kind in ("log", "image"))
+    from volery.logs import open_log
+
+    assert open_log(log)["/uav1/odom"]["pose.pose.position.z"].max() > 0.5
+    assert Path(image).read_bytes().startswith(b"\x89PNG")
+    cases = ElementTree.parse(junit).getroot().findall("testsuite/testcase")
+    assert [case.find("failure") is None for case in cases] == [True, False]
+    calm = test(path, *words, "--seconds", 0.2, "--junit", junit, "--out", tmp_path / "out")
+    assert "no failure in 3 flights; nearest to one: seed 1, wind = [" in calm.output
+    cases = ElementTree.parse(junit).getroot().findall("testsuite/testcase")
+    assert [case.find("failure") is None for case in cases] == [True, True]
 
 
 def test_a_flight_that_never_ends_is_ended(hop, tmp_path):
@@ -227,9 +299,13 @@ BAD = {
     ("hovr",): "did you mean 'hover'?",
     ("hop.toml", "--vary", "wind"): "--vary: KEY=LOW:HIGH, such as wind=0:6, not 'wind'",
     ("hop.toml", "--vary", "wind=3:1"): "3 must be below 1",
-    ("hop.toml", "--vary", "wand=1:3"): "wand",
+    ("hop.toml", "--vary", "wand=1:3"): "--vary wand=1: hop: unknown key 'wand'; did you mean",
+    ("hop.toml", "--vary", "wind=1:3", "--vary", "wind=0:2"): "'wind' is given more than once",
+    ("hop.toml", "--vary", "types.brid.mass_kg=1:2"): "no type 'brid'; did you mean 'bird'?",
+    ("hop.toml", "--vary", "seed=1:9"): "--seeds N --first-seed M varies the seed",
     ("empty.toml",): "expects nothing: add [[expect]]",
     ("none",): "no .toml file in this folder has [[expect]]",
+    ("broken",): "broken/hop.toml: not valid TOML",
     ("unknown.toml",): "did you mean 'no_contact'?",
     ("hop.toml", "--junit", "none"): "cannot be written",
     ("hop.toml", "--seconds", "0"): "duration_s",
@@ -243,6 +319,7 @@ def test_bad_input_is_one_line(hop, tmp_path, words):
     (tmp_path / "empty.toml").write_text(text[: text.index("[[expect]]")])
     (tmp_path / "unknown.toml").write_text(text.replace("no_contact", "no_contacts"))
     (tmp_path / "none").mkdir()
+    hop(name="broken/hop.toml").write_text(text.replace("2.0", "2.0.0"))
     done = test(*words)
     assert done.exit_code == 2, done.output
     assert BAD[words] in done.stderr

@@ -24,7 +24,7 @@ class MadeFlights:
 
     def __init__(self, margin, num_workers=1):
         self.num_workers, self._margin = num_workers, margin
-        self._waiting, self.flown = [], []
+        self._waiting, self.flown, self.recorded = [], [], []
 
     def can_submit(self):
         return len(self._waiting) < self.num_workers
@@ -36,7 +36,7 @@ class MadeFlights:
     def collect(self, _timeout_s):
         batch = self._waiting.pop()  # the last one first: workers end in any order
         (run,) = batch.runs
-        self.flown.append(run)
+        (self.recorded if batch.record else self.flown).append(run)
         values = {name: number(value) for name, value in run.values.items()}
         margin = self._margin(values, run.seed)
         if margin is None:
@@ -47,6 +47,10 @@ class MadeFlights:
 
 def number(value):
     return value[0] if isinstance(value, list) else value
+
+
+def wind_of(values):
+    return number(values.get("vary_0_wind", 0.0))
 
 
 def result_of(run, verdict):
@@ -77,7 +81,7 @@ def test_a_margin_that_leads_there_is_followed():
         for seed in range(8):
             search, _ = search_of(weakness)
             failure = search.search(kind(search.dimensions, seed), 400)
-            found.append(400 if failure is None else failure.flights)
+            found.append(400 if failure.result.is_passed else failure.flights)
         counts[kind] = float(np.median(found))
     assert counts[TpeSampler] <= 100
     assert counts[RandomSampler] > 1.5 * counts[TpeSampler]
@@ -96,9 +100,11 @@ def test_the_search_does_not_settle_where_margins_are_low():
 
 
 def test_no_failure_takes_all_flights():
-    search, executor = search_of(lambda _values, _seed: 1.0, num_workers=2)
-    assert search.search(RandomSampler(search.dimensions, 1), 7) is None
+    search, executor = search_of(lambda values, _seed: 20.0 - wind_of(values), num_workers=2)
+    nearest = search.search(RandomSampler(search.dimensions, 1), 7)
     assert len(executor.flown) == 7
+    assert nearest.result.is_passed
+    assert wind_of(nearest.run.values) == max(wind_of(run.values) for run in executor.flown)
 
 
 def test_the_search_does_not_depend_on_the_order_of_workers():
@@ -115,23 +121,36 @@ def test_the_search_does_not_depend_on_the_order_of_workers():
 
 
 def test_a_failure_is_simplified():
-    def needs_wind(values, _seed):
-        return 3.0 - values.get("vary_0_wind", 0.0)
-
-    search, _ = search_of(needs_wind)
+    search, _ = search_of(lambda values, _seed: 3.03 - wind_of(values))
     failure = search.search(RandomSampler(search.dimensions, 1), 100)
-    assert len(failure.values) == 2
+    assert len(failure.run.values) == 2
     simple = search.simplified(failure)
-    assert list(simple.values) == ["vary_0_wind"]  # the height does not matter
-    assert 3.0 <= number(simple.values["vary_0_wind"]) < 3.0 + 8.0 / 2**5
+    assert list(simple.run.values) == ["vary_0_wind"]  # the height does not matter
+    assert 3.03 <= wind_of(simple.run.values) < 3.03 + 8.0 / 2**5
+    assert wind_of(simple.run.values) == round(wind_of(simple.run.values), 2)
     assert not simple.result.is_passed
-    assert simple.seed == failure.seed
+    assert simple.run.seed == failure.run.seed
+
+
+def test_a_failure_at_the_low_end_has_the_value_of_the_low_end():
+    search, _ = search_of(lambda values, _seed: -1.0 if HEIGHT.name(1) in values else 1.0)
+    failure = search.search(RandomSampler(search.dimensions, 1), 100)
+    simple = search.simplified(failure)
+    assert dict(simple.run.values) == {HEIGHT.name(1): HEIGHT.low}
+
+
+def test_a_found_failure_is_recorded():
+    search, executor = search_of(lambda values, _seed: 3.0 - wind_of(values))
+    failure = search.search(RandomSampler(search.dimensions, 1), 100)
+    assert not executor.recorded
+    search.recorded(failure)
+    assert executor.recorded == [failure.run]
 
 
 def test_a_failure_of_a_seed_alone_needs_no_values():
     search, _ = search_of(lambda _values, seed: -1.0 if seed == 7 else 1.0, seeds=(1, 9))
     failure = search.simplified(search.search(RandomSampler(search.dimensions, 2), 500))
-    assert (dict(failure.values), failure.seed) == ({}, 7)
+    assert (dict(failure.run.values), failure.run.seed) == ({}, 7)
 
 
 def test_a_worker_that_ends_is_a_failure():
@@ -154,3 +173,18 @@ def test_ranges():
     drawn = [WIND.drawn(seed, 0) for seed in range(100)]
     assert 0.0 <= min(drawn) < 1.0
     assert 7.0 < max(drawn) <= 8.0
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "rounded"),
+    [
+        ("a=0:14", 7.1234567, [7.0, 7.1]),
+        ("a=1:6", 1.0072139, [1.0, 1.01]),
+        ("a=100:101", 100.0372139, [100.0, 100.04]),
+        ("a=0:2000", 1234.5678, [1200.0, 1230.0]),
+        ("a=1.04:1.2", 1.0412345, [1.04, 1.041]),
+    ],
+)
+def test_rounded_values(text, number, rounded):
+    found = Variation.of(text).rounded(number)
+    assert found[:2] == pytest.approx(rounded, abs=1e-9)

@@ -54,6 +54,14 @@ def robustness(node, heights, k):
     return max(values, default=-math.inf)
 
 
+def last_begin(node):
+    """Returns the last sample at which a window begins."""
+    if isinstance(node, Comparison):
+        return 0
+    begin = node.interval_s[0] * RATE_HZ if isinstance(node, Temporal) else 0
+    return begin + max(map(last_begin, node.parts))
+
+
 ATOMS = st.sampled_from(["z > 1", "z < 2", "z >= 3", "z <= 0.5"])
 WINDOWS = st.tuples(st.integers(0, 4), st.integers(0, 6)).map(
     lambda w: f", {w[0] / RATE_HZ}, {(w[0] + w[1]) / RATE_HZ}"
@@ -76,8 +84,11 @@ FORMULAS = st.recursive(
 def test_robustness_is_that_of_the_definition(formula, heights):
     path = np.zeros((1, len(heights), 3))
     path[0, :, 2] = heights
-    verdict = verdict_on(flight_of(path, rate_hz=RATE_HZ), formula)
-    expected = robustness(parse_formula(formula), heights, 0)
+    verdict, parsed = verdict_on(flight_of(path, rate_hz=RATE_HZ), formula), parse_formula(formula)
+    expected = robustness(parsed, heights, 0)
+    if math.isinf(expected) or last_begin(parsed) >= len(heights):
+        assert verdict.outcome is Outcome.ERROR
+        return
     assert verdict.margin == expected
     assert verdict.is_passed is (expected >= 0.0)
 
@@ -124,18 +135,37 @@ def test_numbers_that_are_none_are_an_error():
 @pytest.mark.parametrize(
     ("formula", "reason"),
     [
+        ("always(z > 2, 30, 40)", "a window begins after 30 s, the flight ends after 10 s"),
+        ("z > -1 and always(z > 2, 30, 40)", "a window begins after 30 s"),
+        ("always(eventually(z > 1, 6, 7), 5, 5)", "a window begins after 11 s"),
+        ("always(eventually(z > 1, 2, 3))", "a window that moves beyond the end"),
+        ("z / 0 > 1", "not a number"),
+        ("1 / z > 1", "a division by zero"),
+        ("separation > 1", "the separation of a UAV without others"),
+    ],
+)
+def test_formulas_that_cannot_be_judged_are_errors(formula, reason):
+    verdict = verdict_on(flight_of([CLIMB]), formula)
+    assert verdict.outcome is Outcome.ERROR
+    assert reason in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("formula", "reason"),
+    [
         ("always(hight > 1)", "no signal 'hight'"),
         ("z", "is no formula"),
         ("always(z > 1, 5, 2)", "5 s is after 2 s"),
         ("always(z > 1, x, 2)", "times are numbers"),
         ("eventually(z > 1, 3)", "write eventually(f, a, b)"),
         ("z > 1 > ", "cannot be read"),
+        ("z > 2)) and z", "cannot be read at ')) and z': unmatched"),
         ("__import__('os').system('true') > 1", "is no term"),
         ("z != 1", "compare with"),
         ("z > True", "is no term"),
         ("z ** 2 > 1", "is no term"),
         (" and ".join(["z > 1"] * 400), "too long"),
-        ("not " * 100_000 + "z > 1", "cannot be read"),
+        ("not " * 100_000 + "z > 1", "nested too deeply"),
     ],
 )
 def test_formulas_that_are_refused(formula, reason):

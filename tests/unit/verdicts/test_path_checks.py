@@ -92,7 +92,7 @@ def test_separation_within_a_window():
     early = verdict_on(flight, {"kind": "separation", "at_least_m": 3.0, "until_s": 2.0})
     assert early.is_passed
     alone = verdict_on(flight_of([EAST]), {"kind": "separation", "at_least_m": 3.0})
-    assert alone.is_passed
+    assert (alone.outcome, alone.text) == (Outcome.ERROR, "the flight has one UAV only")
 
 
 def test_clearance():

@@ -40,6 +40,12 @@ def wants_more(flight, colour):
     return True
 
 
+def climbs_by_odometry(topics):
+    heights = {name: odom.messages[-1].pose.pose.position.z for name, odom in topics.items()}
+    assert len(topics["/uav1/odom"].times_s) == len(topics["/uav1/odom"].messages) > 20
+    return min(heights.values()) - 0.5
+
+
 def expectation(function, **keys):
     return {"kind": "predicate", "function": f"{__name__}:{function}", **keys}
 
@@ -73,6 +79,7 @@ def test_functions_that_fail_are_errors(function, reason):
         ("missing", {}, "is no function"),
         ("wants_more", {}, "parameter 'colour'"),
         ("is_far", {"parameters": {"speed": 3}}, "parameter 'speed'"),
+        ("climbs_by_odometry", {}, "reads topics: name them in 'topics'"),
     ],
 )
 def test_functions_that_do_not_fit_are_refused(function, keys, reason):
@@ -151,3 +158,16 @@ def test_expecting_adds_to_a_scenario():
         scenario.expecting("speed", at_most_m_s=-1.0)
     with pytest.raises(ScenarioError, match="kind"):
         scenario.expecting("nothing")
+
+
+def test_a_function_reads_messages():
+    hop = {
+        "name": "hop",
+        "duration_s": 1.5,
+        "types": {"bird": {"airframe": "f450", "sensors": [{"kind": "odometry"}]}},
+        "uavs": [{"type": "bird", "position_m": [0.0, 0.0], "on_start": "take_off"}],
+        "expect": [expectation("climbs_by_odometry", topics=["odom"])],
+    }
+    (verdict,) = judged_flight(parse_scenario(hop)).verdicts
+    assert verdict.outcome is Outcome.PASSED, verdict.text
+    assert 0.0 < verdict.margin < 2.0

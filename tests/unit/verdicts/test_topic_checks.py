@@ -70,6 +70,13 @@ def test_values_of_a_field(keys, passed, margin, time_s):
     assert (verdict.time_s, verdict.uav) == (time_s, "uav1")
 
 
+def test_a_window_after_the_end_cannot_be_judged():
+    late = {"kind": "topic_value", "topic": "odom", "field": "z", "at_least": 1.0, "from_s": 60.0}
+    verdict = verdict_on(late, topics=HEIGHTS)
+    assert verdict.outcome is Outcome.ERROR
+    assert "before 60 s" in verdict.text
+
+
 def test_equal_values_have_no_margin():
     topics = {"/status": record([0.5, 1.5], **{"data.phase": ["search", "cruise"]})}
     expectation = {

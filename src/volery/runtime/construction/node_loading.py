@@ -88,7 +88,7 @@ def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]
         raise ScenarioError(f"{where}: {error}") from None
     _check_allowed(entry.node, path, where, access)
     if access.is_trusted:
-        with _also_from(*_local_folders(access)):
+        with _also_from(*access.module_folders):
             return _find_class(path, where, access)
     with _installed_only(access):
         if is_local(path.partition(":")[0], access):
@@ -110,7 +110,7 @@ def find_function(path: str, where: str, access: ScenarioAccess) -> Callable[...
             f"{where}: runs code of its own ({path}): give --trust, or load_scenario(..., "
             "trust=True) in Python, if it is yours"
         )
-    with _also_from(*_local_folders(access)):
+    with _also_from(*access.module_folders):
         module = _import(path.partition(":")[0], f"{where}: '{path}' cannot be imported", access)
     found = getattr(module, path.partition(":")[2], None)
     if not callable(found):
@@ -130,7 +130,7 @@ def is_local(module: str | None, access: ScenarioAccess) -> bool:
     with _installed_only(access):
         if top in sys.modules or _is_found(top):
             return False
-    folders = [str(folder.resolve()) for folder in _local_folders(access)]
+    folders = [str(folder.resolve()) for folder in access.module_folders]
     return PathFinder.find_spec(top, folders) is not None
 
 
@@ -145,10 +145,6 @@ def _check_allowed(node: str, path: str, where: str, access: ScenarioAccess) -> 
         )
     if path.startswith(("volery.", "volery_benchmarks.")) and not access.is_trusted:
         raise ScenarioError(f"{where}: '{node}' is no node that ships with Volery")
-
-
-def _local_folders(access: ScenarioAccess) -> tuple[Path, ...]:
-    return (Path(),) if access.folder is None else (access.folder, Path())
 
 
 def _is_found(top: str) -> bool:
@@ -176,7 +172,7 @@ def _installed_only(access: ScenarioAccess) -> Iterator[None]:
 
     The latter is on the path of `python -m` and `python -c`.
     """
-    local = {folder.resolve() for folder in _local_folders(access)}
+    local = {folder.resolve() for folder in access.module_folders}
     before = list(sys.path)
     sys.path[:] = [entry for entry in before if Path(entry).resolve() not in local]
     try:
@@ -210,7 +206,7 @@ def _import(name: str, failure: str, access: ScenarioAccess) -> ModuleType:
         missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
         if missing and f"{name}.".startswith(f"{missing}."):
             folders = " or ".join(
-                dict.fromkeys(str(each.resolve()) for each in _local_folders(access))
+                dict.fromkeys(str(each.resolve()) for each in access.module_folders)
             )
             raise ScenarioError(
                 f"{failure}: no module '{missing}' is installed or lies in {folders}"

@@ -73,11 +73,7 @@ class CommandLog:
 
     def note(self, command: ClientCommand, weight: CommandEffect) -> None:
         """Publishes and stores a command that is about to take effect."""
-        cdr = None if records.is_large(command) else records.content_bytes(command)
-        self.on_noted(command)
-        moment = self._engine.moment
-        stored = _StoredCommand(self._next_number, self._engine.time_ns, moment, command, cdr)
-        self._next_number += 1
+        stored = self._stamped(command)
         if self._publisher.has_subscribers:
             self._publisher.publish(_message(stored))
         self._store(stored)
@@ -86,11 +82,20 @@ class CommandLog:
             self._engine.count_command()
 
     def end(self) -> None:
-        """Records the end of the flight, once."""
+        """Records the end of the flight, once; calls no nodes, one of which may have ended it."""
         if not self._ended:
             self._ended = True
-            self.note(ClientCommand("", "end", "", ""), CommandEffect.PACES)
-            self._graph.deliver()
+            stored = self._stamped(ClientCommand("", "end", "", ""))
+            self._graph.publish_at_end(self._publisher, _message(stored))
+            self._store(stored)
+
+    def _stamped(self, command: ClientCommand) -> _StoredCommand:
+        """Returns a command that is about to take effect, with its number and time."""
+        cdr = None if records.is_large(command) else records.content_bytes(command)
+        self.on_noted(command)
+        number, moment = self._next_number, self._engine.moment
+        self._next_number += 1
+        return _StoredCommand(number, self._engine.time_ns, moment, command, cdr)
 
     def earlier(self) -> Iterator[Published]:
         """Yields the messages of all commands so far, for a log that starts now.
