@@ -31,6 +31,8 @@ class FlightFailedError(AssertionError):
     The first line is the first failure, the others are the verdicts and the files that were kept.
     """
 
+    __module__ = "builtins"  # as of pytest's own failures: the summary has room for the failure
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Adds the options of the plugin."""

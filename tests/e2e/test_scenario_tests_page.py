@@ -87,7 +87,8 @@ def test_flights_that_fail_leave_what_is_uploaded(steps, checkout):
     assert {".xml", ".mcap", ".png"} <= kinds
 
 
-def test_functions_of_the_document_judge_its_flight(checkout):
+def test_functions_of_the_document_judge_its_flight(checkout, monkeypatch):
+    monkeypatch.delitem(sys.modules, "own_checks", raising=False)
     expectations = re.findall(
         r'^```toml\n(\[\[expect\]\]\nkind = "predicate"\n.*?)^```', PAGE, re.DOTALL | re.M
     )

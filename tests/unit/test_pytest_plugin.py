@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -38,6 +39,7 @@ def suite(tmp_path):
     def run(*words):
         return subprocess.run(
             [sys.executable, "-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider", *words],
+            env={**os.environ, "COLUMNS": "200"},
             cwd=tmp_path,
             capture_output=True,
             text=True,

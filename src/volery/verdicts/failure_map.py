@@ -80,7 +80,13 @@ def _draw_moment(
     axes.plot([x], [y], "x", color=_RED, markersize=13, markeredgewidth=3, zorder=20, label=label)
     speed = math.hypot(vx, vy)
     if speed > 0.0:
-        arrow: dict[str, Any] = {"color": _RED, "angles": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 20}
+        arrow: dict[str, Any] = {
+            "color": _RED,
+            "angles": "xy",
+            "scale_units": "xy",
+            "scale": 1.0,
+            "zorder": 20,
+        }
         label = f"its velocity ({speed:.1f} m/s): 1 s ahead"
         axes.quiver([x], [y], [vx], [vy], width=0.006, label=label, **arrow)
     radius = _RADIUS_M

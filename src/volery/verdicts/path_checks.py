@@ -261,17 +261,27 @@ def _existing(values: Array, instead: float) -> Array:
 
 
 def _mode_history(flight: FlightResult, row: int) -> list[tuple[float, str]]:
-    """Returns times and names of a UAV's modes, from its first sample on."""
+    """Returns times and names of a UAV's modes, from its first sample on.
+
+    Events have the modes that it enters by itself; those that it is commanded are in the samples.
+    """
     name, numbers = flight.uavs[row], flight.mode[row]
-    exists = np.flatnonzero(numbers >= 0)
-    if not len(exists):
-        return []
-    first = float(flight.times_s[exists[0]])
-    history = [(first, FlightMode(int(numbers[exists[0]])).name.lower())]
-    for event in flight.events:
-        change = _MODE_CHANGE.match(event.detail) if event.uav == name else None
-        if change is not None:
-            history.append((s_from_ns(event.time_ns), change[1].lower()))
+    events = {
+        s_from_ns(event.time_ns): change[1].lower()
+        for event in flight.events
+        if event.uav == name and (change := _MODE_CHANGE.match(event.detail))
+    }
+    changed = np.flatnonzero(np.diff(numbers, prepend=-1))
+    after = np.searchsorted(flight.times_s, list(events), side="right")
+    samples = {
+        float(flight.times_s[k]): FlightMode(int(numbers[k])).name.lower()
+        for k in {*changed, *after[after < len(numbers)]}
+        if numbers[k] >= 0
+    }
+    history: list[tuple[float, str]] = []
+    for time_s, mode in sorted({**samples, **events}.items()):
+        if not history or history[-1][1] != mode:
+            history.append((time_s, mode))
     return history
 
 

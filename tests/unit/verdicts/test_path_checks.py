@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_runs import RADIUS_M, Posts, event_of, flight_of, line, run_of
 
+from volery.control.flight_modes import FlightMode
 from volery.verdicts import Outcome
 from volery.verdicts.judging import Judge
 
@@ -133,13 +134,23 @@ def test_speed_and_battery():
 
 
 def test_modes_in_order():
-    changes = [(0.5, "TAKE_OFF"), (2.0, "HOLD"), (3.0, "LAND"), (4.5, "LANDED")]
-    events = tuple(event_of(t, "uav1", "mode", detail=f"changed to {m}") for t, m in changes)
-    flight = flight_of([STILL], events=events, mode=np.zeros((1, 51), np.int8))
+    """What is commanded is in the samples; what a UAV does by itself is also an event."""
+    changes = [(0.0, "LANDED"), (0.5, "TAKE_OFF"), (2.04, "HOLD"), (3.0, "LAND"), (4.54, "LANDED")]
+    events = tuple(
+        event_of(t, "uav1", "mode", detail=f"changed to {m}")
+        for t, m in changes
+        if t in (2.04, 4.54)
+    )
+    numbers = np.zeros((1, 51), np.int8)
+    for time_s, mode in changes:
+        numbers[0, np.arange(51) / 10.0 >= time_s] = FlightMode[mode]
+    flight = flight_of([STILL], events=events, mode=numbers)
     expected = {"kind": "modes", "modes": ["landed", "take_off", "landed"], "by_s": 5.0}
     verdict = verdict_on(flight, expected)
     assert verdict.is_passed
-    assert (verdict.margin, verdict.time_s) == (pytest.approx(0.5), 4.5)
+    assert (verdict.margin, verdict.time_s) == (pytest.approx(0.46), 4.54)
+    order = ["landed", "take_off", "hold", "land", "landed"]
+    assert verdict_on(flight, {"kind": "modes", "modes": order}).is_passed
     assert verdict_on(flight, {**expected, "by_s": 4.0}).outcome is Outcome.FAILED
     endless = verdict_on(flight, {"kind": "modes", "modes": ["hold"]})
     assert endless.is_passed
