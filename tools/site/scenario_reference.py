@@ -57,6 +57,7 @@ EXAMPLES: dict[str, Any] = {
     "MotorFault.rotor": 0,
     "MotorFault.until_s": 40.0,
     "RadioFault.until_s": 40.0,
+    "Scenario.code_folder": "../nodes",
     "Scenario.message_packages": ["px4_msgs"],
     "SensorFault.bias": [0.0, 0.0, 0.3],
     "SensorFault.effect": "biased",
