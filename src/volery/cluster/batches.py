@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,8 +49,8 @@ class RunBatch:
 class Preparation:
     """What a worker found out before its first run."""
 
-    version: str
-    """Version of Volery with a hash of its code; see `code_version`."""
+    versions: Mapping[str, str]
+    """Versions on which results depend; see `runs.versions`."""
     obstacle: str = ""
     """What keeps runs from being environments; empty: nothing."""
     max_environments: int = 1

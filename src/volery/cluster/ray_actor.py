@@ -8,7 +8,7 @@ from pathlib import Path
 
 from volery.cluster.batches import BatchResult, Preparation, RunBatch, StudyJob
 from volery.cluster.errors import StudyError
-from volery.cluster.runs import code_version
+from volery.cluster.runs import versions
 
 
 class RunActor:
@@ -19,7 +19,7 @@ class RunActor:
 
     def greet(self) -> Preparation:
         """Returns its version."""
-        return Preparation(code_version())
+        return Preparation(versions())
 
     def ping(self) -> None:
         """Answers while another thread flies."""

@@ -18,7 +18,7 @@ from volery.cluster.loading import LoadedStudy, scenario_of_study
 from volery.cluster.metric_names import metrics_of
 from volery.cluster.metrics import load_metrics
 from volery.cluster.points import Point
-from volery.cluster.runs import RunResult, RunSpec, code_version, failure_of
+from volery.cluster.runs import RunResult, RunSpec, code_version, failure_of, versions
 from volery.cluster.single_runs import SingleRun
 from volery.core.errors import VoleryError
 from volery.runtime.simulation import Simulation
@@ -49,7 +49,7 @@ def started_worker(job: StudyJob) -> tuple[RunWorker | None, Preparation]:
         worker = RunWorker(job)
         prepared = worker.prepare()
     except VoleryError as error:
-        return None, Preparation(code_version(), error=" ".join(str(error).split()))
+        return None, Preparation(versions(), error=" ".join(str(error).split()))
     gc.collect()
     gc.freeze()  # modules and compiled code outlive all runs
     return worker, prepared
@@ -78,7 +78,7 @@ class RunWorker:
             with Simulation(scenario, threads=1) as simulation:
                 simulation.fly(min(_TRIAL_S, scenario.duration_s))
         except VoleryError as error:
-            return Preparation(code_version(), error=" ".join(str(error).split()))
+            return Preparation(versions(), error=" ".join(str(error).split()))
         metric = next((m.entry.name for m in self._metrics if m.needs_simulation), None)
         reason = f"metric '{metric}' needs a simulation of its own" if metric else ""
         if self._needs & set(NEEDS_SIMULATION) and not reason:
@@ -86,7 +86,7 @@ class RunWorker:
         if self._study.logs == "all":
             reason = "all runs are recorded"
         max_envs = max_environments(scenario, self._study.sample_rate_hz)
-        return Preparation(code_version(), reason or obstacle(scenario), max_envs)
+        return Preparation(versions(), reason or obstacle(scenario), max_envs)
 
     def fly(self, batch: RunBatch) -> BatchResult:
         """Flies a batch; a run that fails has the traceback in its result.

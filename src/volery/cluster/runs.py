@@ -1,8 +1,8 @@
 """Runs of a study: their identity and their results, as plain data.
 
 The identity of a run is a hash of the scenario's content with the run's parameters, of the files
-that it names, of the seed, the duration, the sampling rate and the code of Volery. Equal identities
-mean equal results, so a result that exists is not computed again.
+that it names, of the seed, the duration, the sampling rate, the code of Volery and the versions of
+packages. Equal identities mean equal results, so a result that exists is not computed again.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 
 from volery.cluster.loading import LoadedStudy
 from volery.cluster.points import Point
+from volery.core.machine import describe_versions
 from volery.scenario.file_names import named_files
 from volery.verdicts.verdict import Verdict
 
@@ -112,6 +113,24 @@ def code_version() -> str:
     return f"{__version__}+{digest.hexdigest()[:12]}"
 
 
+@cache
+def versions() -> dict[str, str]:
+    """Returns the versions on which results depend: of Volery's code, Python and packages."""
+    return {"volery's code": code_version(), **describe_versions()}
+
+
+def difference(own: Mapping[str, str], others: Any) -> str:
+    """Returns the first difference of two machines' versions, as text; empty: none.
+
+    others: what another machine has sent.
+    """
+    for name, version in own.items():
+        other = others.get(name) if isinstance(others, Mapping) else None
+        if other != version:
+            return f"{name} {str(other)[:80]} instead of {version}"
+    return ""
+
+
 def failure_of(run: RunSpec, error: BaseException | str, log: str = "") -> RunResult:
     """Returns the result of a failed run; an error is an exception or a sentence."""
     if isinstance(error, str):
@@ -155,7 +174,7 @@ def point_hash(loaded: LoadedStudy, values: Point) -> str:
         "world_seed": scenario.world.seed,
         "duration_s": loaded.duration_s,
         "sample_rate_hz": loaded.study.sample_rate_hz,
-        "version": code_version(),
+        "versions": versions(),
         "parameters": values,
     }
     text = json.dumps(content, sort_keys=True, default=str)

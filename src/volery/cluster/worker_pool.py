@@ -11,12 +11,12 @@ from volery.cluster.batches import BatchResult, Preparation, RunBatch, StudyJob
 from volery.cluster.errors import StudyError
 from volery.cluster.executor import BatchLoss, WorkerState
 from volery.cluster.pool_worker import PoolWorker, Replies
-from volery.cluster.runs import code_version
+from volery.cluster.runs import difference, versions
 
 _AHEAD = 2
 """Batches of a worker: the next one waits, so that the worker does not."""
 _LOOK_S = 0.5
-TIMED_OUT = "exceeded run_timeout_s"
+TIMED_OUT = "exceeded the timeout"
 """Beginning of the reason of a loss by a timeout."""
 
 
@@ -118,11 +118,8 @@ class WorkerPool:
             return None
         if not isinstance(message, Preparation):
             raise StudyError(f"{worker.name} {worker.how_it_ended()} before its first run")
-        if message.version != code_version():
-            raise StudyError(
-                f"{worker.name} has Volery {message.version}, this driver {code_version()}: "
-                "install the same version everywhere"
-            )
+        if differs := difference(versions(), message.versions):
+            raise StudyError(f"{worker.name} has {differs}: install the same everywhere")
         if not worker.has_greeted:
             worker.has_greeted = True
             return None
@@ -169,4 +166,4 @@ class WorkerPool:
             if worker.batches and not worker.ending:
                 allowed_s = self._timeout_s * len(worker.batches[0].runs)
                 if worker.busy_s > allowed_s:
-                    worker.end(f"{TIMED_OUT} = {self._timeout_s:g}")
+                    worker.end(f"{TIMED_OUT} of {self._timeout_s:g} s")

@@ -14,7 +14,7 @@ import threading
 from typing import IO, Any
 
 from volery.cluster.batches import Preparation
-from volery.cluster.runs import code_version
+from volery.cluster.runs import versions
 from volery.cluster.worker_messages import read_message, write_message
 
 
@@ -24,7 +24,7 @@ def main() -> None:
     os.dup2(2, 1)
     messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(sys.stdin.buffer, messages), daemon=True).start()
-    write_message(replies, Preparation(code_version()))
+    write_message(replies, Preparation(versions()))
     _serve(messages, replies)
 
 

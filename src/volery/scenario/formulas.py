@@ -29,6 +29,13 @@ SIGNALS = (
 )
 """Signals of a UAV: position, m, velocity, m/s, in the map; speed, m/s; remaining fraction of the
 battery; tilt, deg; distance to the nearest other UAV, m; simulated time, s."""
+_OTHER_NAMES = {
+    **dict.fromkeys(("altitude", "alt", "height", "z_m"), "z"),
+    **dict.fromkeys(("velocity", "v"), "speed"),
+    **dict.fromkeys(("time", "time_s"), "t"),
+    "charge": "battery",
+}
+"""Names by which others know signals."""
 _TEMPORAL = {"always": 1, "eventually": 1, "until": 2}
 _FUNCTIONS = {"abs": 1, "min": 2, "max": 2}
 _MAX_NODES = 500
@@ -178,8 +185,8 @@ def _term(node: ast.expr) -> Term:
         case ast.Name(id=name) if name in SIGNALS:
             return Signal(name)
         case ast.Name(id=name):
-            known = ", ".join(SIGNALS)
-            raise ValueError(f"no signal '{name}'{near_miss(name, SIGNALS)} Known: {known}")
+            hint = near_miss(_OTHER_NAMES.get(name.lower(), name), SIGNALS)
+            raise ValueError(f"no signal '{name}'{hint} Known: {', '.join(SIGNALS)}")
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return Arithmetic("-", (Number(0.0), _term(operand)))
         case ast.BinOp(left=left, op=op, right=right):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from volery.cluster.batches import BatchResult, Preparation
 from volery.cluster.executor import BatchLoss
-from volery.cluster.runs import RunResult, code_version
+from volery.cluster.runs import RunResult, code_version, versions
 
 TINY = {
     "name": "tiny",
@@ -42,7 +42,7 @@ class FakeExecutor:
         return self
 
     def prepare(self):
-        return Preparation(code_version(), self.obstacle, 4)
+        return Preparation(versions(), self.obstacle, 4)
 
     def can_submit(self):
         return not self.waiting

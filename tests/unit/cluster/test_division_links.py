@@ -58,7 +58,7 @@ def test_a_worker_with_another_token_is_refused_with_the_reason():
 
 
 def test_a_worker_with_other_versions_is_refused_with_the_reason():
-    reason = "it has numba 0.69.0, the leader has 0.68.1"
+    reason = "it has numba 0.69.0 instead of 0.68.1"
     assert met("the token", {**VERSIONS, "numba": "0.69.0"}) == {
         "leader": f"worker 1 was refused: {reason}",
         "worker": f"the leader refuses this worker: {reason}",

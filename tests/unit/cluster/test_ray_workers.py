@@ -104,7 +104,7 @@ def test_killed_silent_and_stuck_workers_cost_only_their_runs(sweep, tmp_path):
     assert table["status"] == ["done", "failed", "failed", "failed", "done"]
     assert table["error"][1].startswith("its worker was lost: The actor died")
     assert table["error"][2].startswith("its worker was lost: no sign of life for")
-    assert table["error"][3] == "its worker exceeded run_timeout_s = 20"
+    assert table["error"][3] == "its worker exceeded the timeout of 20 s"
 
 
 @pytest.mark.slow

@@ -139,7 +139,7 @@ def test_a_run_whose_worker_dies_twice_has_failed(tmp_path):
 
 def test_a_run_that_exceeds_its_time_has_failed_at_once(tmp_path):
     def answer(run):
-        return "exceeded run_timeout_s = 1" if run.seed == 2 else metrics(run)
+        return "exceeded the timeout of 1 s" if run.seed == 2 else metrics(run)
 
     executor, table = fake_study(answer, tmp_path)
     assert table.num_failed == 2

@@ -11,6 +11,7 @@ from studies import TINY, study_file
 from volery.cluster import StudyError, load_study, run_study
 from volery.cluster.batches import StudyJob
 from volery.cluster.process_worker import ProcessWorker
+from volery.cluster.runs import versions
 from volery.cluster.worker_pool import WorkerPool
 
 pytest.importorskip("pyarrow")
@@ -23,11 +24,14 @@ def pool_of(job, folder):
 
 def test_a_worker_with_another_version_is_refused(tmp_path, monkeypatch):
     loaded = load_study(TINY)
-    monkeypatch.setattr("volery.cluster.worker_pool.code_version", lambda: "0.0.9+older")
+    mine = {**versions(), "numpy": "1.0.0"}
+    monkeypatch.setattr("volery.cluster.worker_pool.versions", lambda: mine)
     job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
     pool = pool_of(job, tmp_path)
     try:
-        with pytest.raises(StudyError, match=r"worker 1 has Volery .*, this driver 0.0.9\+older"):
+        with pytest.raises(
+            StudyError, match=r"worker 1 has numpy \S+ instead of 1\.0\.0: install the"
+        ):
             pool.prepare()
     finally:
         pool.close()
@@ -62,7 +66,7 @@ def test_killed_and_stuck_workers_cost_only_their_runs(tmp_path):
     table = run_study(path, tmp_path / "out", workers=1, trust=True)
     assert table["status"] == ["done", "failed", "failed", "done"]
     assert table["error"][1] == "its worker was killed by signal 9 (SIGKILL)"
-    assert table["error"][2] == "its worker exceeded run_timeout_s = 10"
+    assert table["error"][2] == "its worker exceeded the timeout of 10 s"
     words = [log.read_text() for log in (tmp_path / "out" / "workers").iterdir()]
     assert any("words of the user" in each for each in words)
 

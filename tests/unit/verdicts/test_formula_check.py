@@ -154,6 +154,7 @@ def test_formulas_that_cannot_be_judged_are_errors(formula, reason):
     ("formula", "reason"),
     [
         ("always(hight > 1)", "no signal 'hight'"),
+        ("always(altitude > 1)", "no signal 'altitude'; did you mean 'z'?"),
         ("z", "is no formula"),
         ("always(z > 1, 5, 2)", "5 s is after 2 s"),
         ("always(z > 1, x, 2)", "times are numbers"),

@@ -12,9 +12,8 @@ from pathlib import Path
 from volery.cluster.division.job import DivisionJob
 from volery.cluster.division.link import Link, apply_to
 from volery.cluster.division.worker import RunEndedError, Worker
-from volery.cluster.runs import code_version
+from volery.cluster.runs import versions
 from volery.core.errors import DivisionError, VoleryError, reason_of
-from volery.core.machine import describe_versions
 from volery.core.plurals import counted
 from volery.runtime.division_parts import DivisionParts
 from volery.runtime.simulation import Simulation
@@ -42,7 +41,7 @@ def serve_leader(
     """
     link = Link(_connected(address, wait_s, show), "the leader")
     try:
-        apply_to(link, token, {"volery's code": code_version(), **describe_versions()})
+        apply_to(link, token, versions())
         link.show_life()
         show(f"has joined {address[0]}:{address[1]}")
         kind, *rest = link.receive()

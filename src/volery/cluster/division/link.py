@@ -16,6 +16,7 @@ from typing import Any
 
 import cbor2
 
+from volery.cluster.runs import difference
 from volery.core.errors import DivisionError, reason_of
 from volery.core.network_access import tend
 
@@ -133,8 +134,8 @@ def admit(link: Link, token: str, versions: dict[str, str]) -> None:
     other_nonce, proof, others = rest
     if not _is_proof(proof, token, b"worker", nonce, other_nonce):
         _refuse(link, "the token is wrong")
-    if reason := _difference(versions, others):
-        _refuse(link, reason)
+    if differs := difference(versions, others):
+        _refuse(link, f"it has {differs}")
     link.send("welcome", _proof(token, b"leader", nonce, other_nonce))
 
 
@@ -165,15 +166,6 @@ def _is_proof(given: Any, token: str, role: bytes, first: bytes, second: bytes) 
     return isinstance(given, bytes) and hmac.compare_digest(
         given, _proof(token, role, first, second)
     )
-
-
-def _difference(own: dict[str, str], others: Any) -> str:
-    """Returns the first difference of two machines' versions, as text; empty: none."""
-    for name, version in own.items():
-        other = others.get(name) if isinstance(others, dict) else None
-        if other != version:
-            return f"it has {name} {str(other)[:80]}, the leader has {version}"
-    return ""
 
 
 def _reason(error: OSError) -> str:

@@ -20,9 +20,9 @@ from volery.cluster.division.job import DivisionJob, files_of
 from volery.cluster.division.leader import Leader, Member, greeting_of
 from volery.cluster.division.link import Link, LinkError, RefusedError, admit
 from volery.cluster.division.partitioning import check_divisible, divided
-from volery.cluster.runs import code_version
+from volery.cluster.runs import versions
 from volery.core.errors import DivisionError, VoleryError, reason_of
-from volery.core.machine import describe_versions, usable_cores
+from volery.core.machine import usable_cores
 from volery.core.plurals import counted
 from volery.engine.engine import Division
 from volery.runtime.construction.partition import Partition
@@ -75,7 +75,7 @@ class Workers:
         self._options, self._scenario, self._show = options, scenario, show
         self._is_stopped = is_stopped
         self._token = options.token or secrets.token_urlsafe(24)
-        self._versions = {"volery's code": code_version(), **describe_versions()}
+        self._versions = versions()
         host, port = options.listen or ("127.0.0.1", 0)
         self._listener = _listener(host, port)
         self._started: list[_LocalWorker] = []
