@@ -80,7 +80,7 @@ class StudyDriver:
         self._failed = sum(result.is_failed for result in plan.results.values())
         self._start = time.monotonic()
         self._last_run_s = 0.0
-        self._prepared = Preparation("")
+        self._prepared = Preparation({})
 
     def run(self, prepared: Preparation) -> None:
         """Flies all missing runs. Raises `StudyError` if results cannot be stored."""

@@ -75,6 +75,8 @@ class Comparison:
     """The greater one."""
     right: Term
     """The smaller one."""
+    text: str
+    """The comparison as it was written."""
     is_equality: bool = False
     """Whether they must be equal; the robustness is then at most 0."""
 
@@ -161,16 +163,18 @@ def _seconds(name: str, node: ast.expr) -> float:
 
 
 def _comparison(left: ast.expr, ops: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> Formula:
-    terms = [_term(node) for node in (left, *others)]
+    nodes = [left, *others]
     found: list[Formula] = []
-    for one, op, other in zip(terms[:-1], ops, terms[1:], strict=True):
+    for one, op, other in zip(nodes[:-1], ops, nodes[1:], strict=True):
+        first, second = _term(one), _term(other)
+        text = ast.unparse(ast.Compare(one, [op], [other]))
         match op:
             case ast.Gt() | ast.GtE():
-                found.append(Comparison(one, other))
+                found.append(Comparison(first, second, text))
             case ast.Lt() | ast.LtE():
-                found.append(Comparison(other, one))
+                found.append(Comparison(second, first, text))
             case ast.Eq():
-                found.append(Comparison(one, other, is_equality=True))
+                found.append(Comparison(first, second, text, is_equality=True))
             case _:
                 raise ValueError("compare with <, <=, >, >= or ==")
     return found[0] if len(found) == 1 else Connective("and", tuple(found))

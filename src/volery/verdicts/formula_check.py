@@ -50,10 +50,10 @@ _OPERATIONS: Mapping[str, Callable[..., Array]] = {
 
 
 class _Robustness(NamedTuple):
-    """Robustness (T,) at each sample, and the samples (T,) that decide it."""
+    """Robustness (T,) at each sample, and what decides it (T, 2): a sample and a comparison."""
 
     value: Array
-    decided_at: NDArray[np.int64]
+    decided_by: NDArray[np.int64]
 
 
 def formula(run: FinishedRun, expectation: FormulaExpectation) -> Finding:
@@ -71,7 +71,7 @@ def formula(run: FinishedRun, expectation: FormulaExpectation) -> Finding:
                 f"{lasts_s:g} s"
             )
         found = _evaluate(parsed, signals)
-        margin, sample = float(found.value[0]), int(found.decided_at[0])
+        margin, (sample, comparison) = float(found.value[0]), found.decided_by[0]
         if math.isnan(margin):
             raise JudgmentError(f"{signals.uav}: a signal of the formula is not a number")
         if math.isinf(margin):
@@ -81,7 +81,8 @@ def formula(run: FinishedRun, expectation: FormulaExpectation) -> Finding:
             )
         if not worst.uav or margin < worst.margin:
             time_s = float(signals.times_s[sample])
-            worst = Finding(f"robustness {margin:.3g}", margin, "", time_s, signals.uav)
+            text = f"robustness {margin:.3g} of {signals.comparisons[comparison].text}"
+            worst = Finding(text, margin, "", time_s, signals.uav)
     if not worst.uav:
         raise JudgmentError("the flight has no UAV")
     return worst
@@ -99,6 +100,8 @@ class _Signals:
         steps = np.diff(self.times_s)
         self.period_s = float(np.median(steps)) if len(steps) else 1.0
         """Time between two samples, s."""
+        self.comparisons: list[Comparison] = []
+        """Comparisons evaluated so far."""
 
     def __getitem__(self, name: str) -> Array:
         flight, row, exists = self._flight, self._row, self._exists
@@ -141,11 +144,13 @@ def _evaluate(node: Formula, signals: _Signals) -> _Robustness:
         with np.errstate(invalid="ignore"):
             apart = _values(node.left, signals) - _values(node.right, signals)
         here = np.arange(len(signals.times_s))
-        return _Robustness(-np.abs(apart) if node.is_equality else apart, here)
+        decided_by = np.stack((here, np.full_like(here, len(signals.comparisons))), axis=1)
+        signals.comparisons.append(node)
+        return _Robustness(-np.abs(apart) if node.is_equality else apart, decided_by)
     parts = [_evaluate(part, signals) for part in node.parts]
     if isinstance(node, Connective):
         if node.operator == "not":
-            return _Robustness(-parts[0].value, parts[0].decided_at)
+            return _negated(parts[0])
         return reduce(_min if node.operator == "and" else _max, parts)
     first, last = _window(node, signals)
     if node.operator == "always":
@@ -177,14 +182,14 @@ def _window(node: Temporal, signals: _Signals) -> tuple[int, int]:
 
 
 def _negated(one: _Robustness) -> _Robustness:
-    return _Robustness(-one.value, one.decided_at)
+    return _Robustness(-one.value, one.decided_by)
 
 
 def _max(one: _Robustness, other: _Robustness) -> _Robustness:
     is_one = ~(other.value > one.value)
     return _Robustness(
         np.where(is_one, one.value, other.value),
-        np.where(is_one, one.decided_at, other.decided_at),
+        np.where(is_one[:, None], one.decided_by, other.decided_by),
     )
 
 
@@ -195,10 +200,10 @@ def _min(one: _Robustness, other: _Robustness) -> _Robustness:
 def _shifted(one: _Robustness, samples: int) -> _Robustness:
     """Returns the robustness some samples later; -inf, decided by the last one, after the end."""
     count = len(one.value)
-    value, decided = np.full(count, -np.inf), np.full(count, count - 1, np.int64)
+    value, decided_by = np.full(count, -np.inf), np.tile(one.decided_by[-1], (count, 1))
     kept = max(0, count - samples)
-    value[:kept], decided[:kept] = one.value[samples:], one.decided_at[samples:]
-    return _Robustness(value, decided)
+    value[:kept], decided_by[:kept] = one.value[samples:], one.decided_by[samples:]
+    return _Robustness(value, decided_by)
 
 
 def _sliding_max(one: _Robustness, first: int, last: int) -> _Robustness:

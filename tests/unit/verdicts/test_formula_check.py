@@ -172,3 +172,11 @@ def test_formulas_that_cannot_be_judged_are_errors(formula, reason):
 def test_formulas_that_are_refused(formula, reason):
     with pytest.raises(ValueError, match=reason.replace("(", r"\(").replace(")", r"\)")):
         parse_formula(formula)
+
+
+def test_the_text_names_the_comparison_that_decides():
+    flight = flight_of([CLIMB])
+    falls = verdict_on(flight, "always(z < 20) and (eventually(x > 3) or not z < 2.5)")
+    assert falls.text == "robustness -2.5 of z < 2.5"
+    chained = verdict_on(flight, "always(-1 < z <= 9, 0, 10)")
+    assert (chained.text, chained.time_s) == ("robustness -1 of z <= 9", pytest.approx(10.0))
