@@ -103,3 +103,23 @@ def test_functions_of_the_document_judge_its_flight(checkout, monkeypatch):
     verdicts = judged_flight(load_scenario(file, trust=True)).verdicts
     assert [verdict.outcome for verdict in verdicts] == ["passed"] * 5
     assert [0.0 < verdict.margin < 5.0 for verdict in verdicts[3:]] == [True, True]
+
+
+def test_the_examples_in_python_run(tmp_path):
+    (flown,) = re.findall(
+        r"^```python\n(from volery import load_scenario\n.*?)^```", PAGE, re.DOTALL | re.M
+    )
+    (tested,) = re.findall(r"^```python\n(import pytest\n.*?)^```", PAGE, re.DOTALL | re.M)
+    names = {}
+    exec(compile(flown, "scenario_tests.md", "exec"), names)
+    assert names["judged"].is_passed
+    (tmp_path / "test_hover.py").write_text(tested, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "--volery-seeds", "2"],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=900.0,
+    )
+    assert "2 passed" in done.stdout, done.stdout
