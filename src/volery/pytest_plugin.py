@@ -132,6 +132,7 @@ def flight(request: pytest.FixtureRequest) -> Callable[..., JudgedFlight]:
 
     def fly(scenario: Scenario | str | Path, *, check: bool = True, **keys: Any) -> JudgedFlight:
         __tracebackhide__ = True
+        problem = ""
         try:
             if not isinstance(scenario, Scenario):
                 file = request.path.parent / scenario
@@ -140,7 +141,9 @@ def flight(request: pytest.FixtureRequest) -> Callable[..., JudgedFlight]:
             flown = scenario.with_(keys) if keys else scenario
             judged = judged_flight(flown)
         except ScenarioError as error:
-            pytest.fail(str(error))
+            problem = str(error)
+        if problem:  # outside, so that pytest shows no lines of Volery
+            pytest.fail(problem)
         if check:
             _check(request.node, flown, judged)
         return judged

@@ -127,6 +127,16 @@ def test_the_second_signal_ends_it_at_once(tmp_path, number):
 
 
 @pytest.mark.slow
+def test_a_reader_that_has_gone_is_no_success():
+    """`set -o pipefail; volery test ... | head -1` must not pass."""
+    with subprocess.Popen(
+        [*CLI, "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.close()
+        assert process.wait(HANG_S) == 128 + signal.SIGPIPE
+        assert process.stderr.read() == ""
+
+
 def test_nohup_is_respected(tmp_path):
     log = tmp_path / "flight.mcap"
     program = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{FLIES}"

@@ -99,9 +99,10 @@ def guarded(command: Callable[P, None]) -> Callable[P, None]:
             complain_of(error)
             raise typer.Exit(USER_ERROR) from None
         except BrokenPipeError:
-            # The reader of our output went away (`volery list | head -1`): end quietly.
+            # The reader of our output went away (`volery list | head -1`): end quietly, and as
+            # other programs do, so that a test that was not finished does not pass.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(0) from None
+            raise typer.Exit(128 + signal.SIGPIPE) from None
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
             complain(f"{where}{error.strerror or error}")

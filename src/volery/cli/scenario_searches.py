@@ -49,7 +49,7 @@ def _searched(test: ScenarioTest, flights: int, sampler: str) -> SearchedScenari
     with folder.locked(), closing(executor_of(loaded, sweep, folder)) as executor:
         folder.clear()
         executor.prepare()
-        search = FailureSearch(loaded, options.variations, seeds, executor)
+        search = FailureSearch(loaded, test.variations, seeds, executor)
         kind = TpeSampler if sampler == "tpe" else RandomSampler
         found = search.search(kind(search.dimensions, first), flights)
         is_failed = not found.result.is_passed

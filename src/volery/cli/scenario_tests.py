@@ -10,8 +10,8 @@ import re
 import shlex
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -164,8 +164,9 @@ class ScenarioTest:
         scenario = load_scenario(path, trust=trust)
         if not scenario.expect:
             raise ScenarioError(f"{path}: expects nothing: add [[expect]] (docs/scenario_tests.md)")
-        _check_variations(options.variations, scenario)
-        self.loaded = load_study(_study_of(path, name, scenario, options), trust=trust)
+        self.variations = tuple(_fitted(each, scenario) for each in options.variations)
+        """Ranges of its keys."""
+        self.loaded = load_study(self._study(name, scenario), trust=trust)
         """The study of its flights."""
         self.folder = options.out / self.loaded.study.name
         """Folder of its files."""
@@ -208,6 +209,29 @@ class ScenarioTest:
         log = self.folder / result.log if result.log else None
         return TestedFlight(run.seed, changes, result, replay, log)
 
+    def _study(self, name: str, scenario: Scenario) -> Study:
+        options = self.options
+        first = scenario.seed if options.seeds is None else options.first_seed
+        seeds = list(range(first, first + (options.seeds or 1)))
+        given: dict[str, Any] = {"seeds": seeds}
+        if self.variations:
+            parameters: dict[str, Any] = {"seed": {"key": "seed", "values": seeds}}
+            for number, variation in enumerate(self.variations):
+                values = [variation.value(variation.drawn(seed, number)) for seed in seeds]
+                parameters[variation.name(number)] = {"key": variation.key, "values": values}
+            given = {"combine": "list", "parameters": parameters}
+        is_shipped = self.path in library.names()
+        data = {
+            "name": name,
+            "scenario": self.path if is_shipped else str(Path(self.path).resolve()),
+            "duration_s": options.seconds,
+            "metrics": ["expectations"],
+            "logs": "failed" if options.keeps_logs else "none",
+            "run_timeout_s": options.timeout_s,
+            **given,
+        }
+        return parse_study(data, f"test of {self.path}")
+
     def _changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Returns the values of a run's parameters but the seed, by their keys."""
         parameters = self.loaded.study.parameters
@@ -223,37 +247,28 @@ class ScenarioTest:
         return f" --seconds {end_s:.1f}" if math.isfinite(end_s) else ""
 
 
-def _check_variations(variations: Sequence[Variation], scenario: Scenario) -> None:
-    """Raises `ScenarioError` if a scenario has no such key, or rejects an end of the range."""
-    for variation in variations:
-        for number in (variation.low, variation.high):
-            try:
-                scenario.with_({variation.key: variation.value(number)})
-            except ScenarioError as error:
-                raise ScenarioError(f"--vary {variation.key}={number:g}: {error}") from None
+def _fitted(variation: Variation, scenario: Scenario) -> Variation:
+    """Returns a variation whose values are whole numbers if its key takes no others.
+
+    Raises `ScenarioError` if the scenario has no such key, or rejects an end of the range.
+    """
+    whole = replace(variation, is_whole=True)
+    if _problem(variation, scenario) and not _problem(whole, scenario):
+        return whole
+    if problem := _problem(variation, scenario):
+        raise ScenarioError(problem)
+    return variation
 
 
-def _study_of(path: str, name: str, scenario: Scenario, options: TestOptions) -> Study:
-    first = scenario.seed if options.seeds is None else options.first_seed
-    seeds = list(range(first, first + (options.seeds or 1)))
-    is_shipped = path in library.names()
-    given: dict[str, Any] = {"seeds": seeds}
-    if options.vary:
-        parameters: dict[str, Any] = {"seed": {"key": "seed", "values": seeds}}
-        for number, variation in enumerate(options.variations):
-            values = [variation.value(variation.drawn(seed, number)) for seed in seeds]
-            parameters[variation.name(number)] = {"key": variation.key, "values": values}
-        given = {"combine": "list", "parameters": parameters}
-    data = {
-        "name": name,
-        "scenario": path if is_shipped else str(Path(path).resolve()),
-        "duration_s": options.seconds,
-        "metrics": ["expectations"],
-        "logs": "failed" if options.keeps_logs else "none",
-        "run_timeout_s": options.timeout_s,
-        **given,
-    }
-    return parse_study(data, f"test of {path}")
+def _problem(variation: Variation, scenario: Scenario) -> str:
+    """Returns why a scenario rejects an end of a range, or a value inside; empty: it does not."""
+    middle = 0.5 * (variation.low + variation.high) + 0.1 * (variation.high - variation.low)
+    for number in (variation.low, variation.high, middle):
+        try:
+            scenario.with_({variation.key: variation.value(number)})
+        except ScenarioError as error:
+            return f"--vary {variation.key}={number:g}: {error}"
+    return ""
 
 
 def _study_name(path: str) -> str:

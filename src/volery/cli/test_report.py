@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -28,10 +30,11 @@ def report_tests(options: TestOptions, junit: Path | None, *, as_json: bool) -> 
     `ScenarioError` for a test that cannot start, and if the file cannot be written.
     """
     start, finished = time.monotonic(), []
-    for tested in run_tests(options):
-        finished.append(tested)
-        if not as_json:
-            print_scenario(tested)
+    with _quiet(as_json):
+        for tested in run_tests(options):
+            finished.append(tested)
+            if not as_json:
+                print_scenario(tested)
     if as_json:
         echo_lines(json_of(finished))
     else:
@@ -48,7 +51,8 @@ def report_search(
 
     junit: file of JUnit XML; None: none. Raises `ScenarioError` as `report_tests`.
     """
-    searched = search_failures(options, flights, sampler)
+    with _quiet(as_json):
+        searched = search_failures(options, flights, sampler)
     if junit is not None:
         _write_junit(junit, [each.tested for each in searched])
     if as_json:
@@ -57,6 +61,11 @@ def report_search(
         for each in searched:
             _print_search(each)
     return not any(each.tested.failed for each in searched)
+
+
+def _quiet(as_json: bool) -> AbstractContextManager[object]:
+    """Sends what nodes and functions of the user print to stderr, if stdout carries JSON."""
+    return redirect_stdout(sys.stderr) if as_json else nullcontext()
 
 
 def _print_search(searched: SearchedScenario) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from volery.cluster.built_in_metrics import FUNCTIONS
 from volery.cluster.errors import StudyError
 from volery.cluster.metric_names import MetricEntry, fingerprint_of
-from volery.core.errors import VoleryError
+from volery.core.errors import FAILURES, VoleryError
 from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of
 from volery.verdicts.user_functions import needs_of
 
@@ -69,7 +69,7 @@ def _import(function: str, folder: Path) -> Callable[..., Any]:
     module_name, _, name = function.partition(":")
     try:
         module = _import_module(module_name, folder)
-    except Exception as error:
+    except FAILURES as error:
         raise StudyError(
             f"metric {function}: {module_name} cannot be imported: {type(error).__name__}: {error}"
         ) from error

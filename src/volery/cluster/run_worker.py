@@ -20,7 +20,7 @@ from volery.cluster.metrics import load_metrics
 from volery.cluster.points import Point
 from volery.cluster.runs import RunResult, RunSpec, code_version, failure_of, versions
 from volery.cluster.single_runs import SingleRun
-from volery.core.errors import VoleryError
+from volery.core.errors import FAILURES, VoleryError
 from volery.runtime.simulation import Simulation
 from volery.scenario.schema import Scenario
 from volery.verdicts.failure_map import failure_png
@@ -145,7 +145,7 @@ class RunWorker:
             if keeps_log and judge is not None and not result.is_passed:
                 image = failure_png(flown.flight, flown.verdicts, chosen.expect)
                 (self._job.results / f"{run.id}.png").write_bytes(image)
-        except Exception as error:
+        except FAILURES as error:
             if _is_disk_full(error):
                 raise DiskFullError(f"{self._job.results}: {_DISK_FULL}") from None
             result = failure_of(run, error, kept)
@@ -164,7 +164,7 @@ class RunWorker:
                 flown = replace(flown, verdicts=judge.verdicts(flown))
             for metric in self._metrics:
                 values.update(metric.values(flown))
-        except Exception as error:
+        except FAILURES as error:
             return failure_of(run, error, log)
         return RunResult(
             id=run.id,

@@ -25,6 +25,8 @@ class Variation:
     """Minimum value."""
     high: float
     """Greatest value."""
+    is_whole: bool = False
+    """Whether values are whole numbers."""
 
     @classmethod
     def of(cls, text: str) -> Variation:
@@ -38,6 +40,8 @@ class Variation:
             raise StudyError(f"--vary: KEY=LOW:HIGH, such as wind=0:6, not '{text}'") from None
         if found["key"] == "seed":
             raise StudyError("--vary seed: --seeds N --first-seed M varies the seed")
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise StudyError(f"--vary {text}: the range must be finite")
         if not low < high:
             raise StudyError(f"--vary {text}: {low:g} must be below {high:g}")
         return cls(found["key"], low, high)
@@ -53,6 +57,8 @@ class Variation:
 
     def value(self, drawn: float) -> Any:
         """Returns what a scenario has under the key."""
+        if self.is_whole:
+            return round(drawn)
         return [drawn, 0.0, 0.0] if self.key == "wind" else drawn
 
     def at(self, part: float) -> float:

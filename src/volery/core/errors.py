@@ -14,6 +14,10 @@ class ScenarioError(VoleryError):
     """A scenario cannot be loaded or run; the message names file, key and allowed values."""
 
 
+FAILURES = (Exception, SystemExit)
+"""What code of users raises when it fails: `sys.exit` in it ends no more than an exception."""
+
+
 class DataFileError(VoleryError):
     """A data file (inventory, elevation grid, airframe, sensor) is missing or broken."""
 

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from volery.scenario.base import Data, NonNegative, Positive, Vector2, check_rectangle
 from volery.scenario.faults import SimulatedTime
-from volery.scenario.formulas import parse_formula
+from volery.scenario.formulas import is_invariant, parse_formula
 
 _Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _Text = Annotated[str, Field(min_length=1, max_length=2000)]
@@ -199,7 +199,7 @@ class BatteryExpectation(_Windowed):
     """Minimum remaining fraction of the capacity."""
 
     def _words(self) -> str:
-        return f"battery >= {self.at_least:.0%}"
+        return f"battery >= {100.0 * self.at_least:g} %"
 
 
 class ModesExpectation(_Expectation):
@@ -384,6 +384,10 @@ class FormulaExpectation(_Expectation):
     def _can_be_read(self) -> Self:
         parse_formula(self.formula)
         return self
+
+    def decided_s(self, moment_s: float) -> float:
+        """Returns the moment for what must always hold, else inf."""
+        return moment_s if is_invariant(parse_formula(self.formula)) else math.inf
 
     def _words(self) -> str:
         return re.sub(r"\s+", " ", self.formula.strip())

@@ -123,6 +123,21 @@ def parse_formula(text: str) -> Formula:
     return _formula(tree.body)
 
 
+def is_invariant(formula: Formula) -> bool:
+    """Returns whether a failure is final: the formula always holds, or holds at the beginning."""
+    if isinstance(formula, Connective) and formula.operator == "and":
+        return all(is_invariant(part) for part in formula.parts)
+    if isinstance(formula, Temporal):
+        return formula.operator == "always" and not _is_temporal(formula.parts[0])
+    return not _is_temporal(formula)
+
+
+def _is_temporal(formula: Formula) -> bool:
+    if isinstance(formula, Comparison):
+        return False
+    return isinstance(formula, Temporal) or any(_is_temporal(part) for part in formula.parts)
+
+
 def _formula(node: ast.expr) -> Formula:
     match node:
         case ast.BoolOp(op=op, values=values):

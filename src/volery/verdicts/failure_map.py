@@ -87,7 +87,7 @@ def _draw_moment(
             "scale": 1.0,
             "zorder": 20,
         }
-        label = f"its velocity ({speed:.1f} m/s): 1 s ahead"
+        label = f"its horizontal velocity ({speed:.1f} m/s): 1 s ahead"
         axes.quiver([x], [y], [vx], [vy], width=0.006, label=label, **arrow)
     radius = _RADIUS_M
     if goal is not None:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -104,6 +105,20 @@ def digest_of(flight: FlightResult) -> str:
         words = [event.time_ns, event.uav, str(event.kind), *event.position_map, event.speed_m_s]
         digest.update(json.dumps([*words, event.partner, event.detail]).encode())
     return digest.hexdigest()
+
+
+@contextmanager
+def read_only(flight: FlightResult) -> Iterator[None]:
+    """Makes a flight's states read-only while the body runs, such as a function of the user."""
+    states = [getattr(flight, name) for name in (*_STATES, "times_s")]
+    writeable = [state for state in states if state.flags.writeable]
+    try:
+        for state in writeable:
+            state.flags.writeable = False
+        yield
+    finally:
+        for state in writeable:
+            state.flags.writeable = True
 
 
 def arguments_of(run: FinishedRun, names: tuple[str, ...]) -> dict[str, Any]:

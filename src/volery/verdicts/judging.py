@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from volery.core.errors import ScenarioError, VoleryError
+from volery.core.errors import FAILURES, ScenarioError, VoleryError
+from volery.graph.nodes.failures import location_of
 from volery.runtime.construction.node_loading import find_function
 from volery.scenario.expectations import Expectation, PredicateExpectation, names_of
 from volery.scenario.schema import Scenario
 from volery.verdicts import path_checks, topic_checks
-from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of
+from volery.verdicts.finished_run import NEEDS_SIMULATION, FinishedRun, arguments_of, read_only
 from volery.verdicts.formula_check import formula
 from volery.verdicts.user_functions import needs_of
 from volery.verdicts.verdict import Finding, JudgmentError, Outcome, Verdict
@@ -133,7 +134,7 @@ class _Predicate(NamedTuple):
 
     function: Callable[..., Any]
     needs: tuple[str, ...]
-    parameters: Mapping[str, Any]
+    expectation: PredicateExpectation
 
     @classmethod
     def of(cls, expectation: PredicateExpectation, where: str, scenario: Scenario) -> _Predicate:
@@ -146,14 +147,20 @@ class _Predicate(NamedTuple):
             raise ScenarioError(
                 f"{where}: {expectation.function} reads topics: name them in 'topics'"
             )
-        return cls(function, needs, expectation.parameters)
+        return cls(function, needs, expectation)
 
     def judge(self, run: FinishedRun) -> Finding:
         """Returns what the function returns. Raises `JudgmentError` for what it raises."""
+        path_checks.rows_of(run.flight, self.expectation)
+        arguments = {**arguments_of(run, self.needs), **self.expectation.parameters}
         try:
-            found = self.function(**arguments_of(run, self.needs), **self.parameters)
-        except Exception as error:
-            raise JudgmentError(f"{type(error).__name__}: {error}") from error
+            with read_only(run.flight):
+                found = self.function(**arguments)
+        except FAILURES as error:
+            silent = topic_checks.silent_topics(run, self.expectation)
+            raise JudgmentError(
+                f"{type(error).__name__}: {error}{location_of(error)}{silent and f'; {silent}'}"
+            ) from error
         if isinstance(found, bool | np.bool_):
             return Finding("true" if found else "false", is_passed=bool(found))
         if not isinstance(found, int | float | np.number) or math.isnan(found):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.arrays import Array
+from volery.core.near_names import near_miss
 from volery.core.rotations import matrix
 from volery.graph.nodes.logger import ROSOUT, LoggingSeverity
 from volery.results.alignment import at_times, common_times, umeyama
@@ -18,6 +19,7 @@ from volery.scenario.expectations import (
     EstimateErrorExpectation,
     LogMessageExpectation,
     NeesExpectation,
+    PredicateExpectation,
     RealTimeFactorExpectation,
     TopicRateExpectation,
     TopicValueExpectation,
@@ -52,7 +54,7 @@ def topic_rate(run: FinishedRun, expectation: TopicRateExpectation) -> Finding:
             rate = _count(record, first, first + width) / width
             if rate - expectation.at_least_hz < worst.margin:
                 margin = rate - expectation.at_least_hz
-                what = f"{rate:g} Hz" if record.times_s else f"no message on {topic}"
+                what = f"{rate:g} Hz" if record.times_s else _silent(run, topic)
                 worst = Finding(what, margin, "Hz", first, uav)
     return worst
 
@@ -68,7 +70,8 @@ def topic_value(run: FinishedRun, expectation: TopicValueExpectation) -> Finding
         times_s = record.times_s[first:last]
         values = record.values[expectation.field][first:last]
         if not times_s:
-            found.append(Finding(f"no message on {topic}", uav=uav, is_passed=False))
+            what = f"no message on {topic}" if record.times_s else _silent(run, topic)
+            found.append(Finding(what, uav=uav, is_passed=False))
             continue
         margins = [_margin(value, expectation, topic) for value in values]
         if expectation.when == "at_end":
@@ -159,6 +162,21 @@ def _records(
     for uav in uavs:
         (topic,) = topics_of(expectation.topic, (uav,))
         yield uav, topic, run.topics.get(topic, TopicRecord(values=_no_values(expectation)))
+
+
+def silent_topics(run: FinishedRun, expectation: PredicateExpectation) -> str:
+    """Returns which of a predicate's topics had no message, as text; empty: none."""
+    uavs = expectation.uavs or run.flight.uavs
+    named = [topic for each in expectation.topics for topic in topics_of(each, uavs)]
+    silent = [topic for topic in named if not run.topics.get(topic, TopicRecord()).times_s]
+    return _silent(run, silent[0]) if silent else ""
+
+
+def _silent(run: FinishedRun, topic: str) -> str:
+    """Returns that a topic had no message, with the nearest name if the graph does not have it."""
+    known = [] if run.simulation is None else [t.name for t in run.simulation.graph.topics()]
+    hint = "" if topic in known else near_miss(topic, known).rstrip(".")
+    return f"no message on {topic}{hint}"
 
 
 def _no_values(expectation: TopicRateExpectation | TopicValueExpectation) -> dict[str, list[Any]]:

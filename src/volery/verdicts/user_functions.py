@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from volery.core.errors import VoleryError
+from volery.core.near_names import near_miss
 from volery.verdicts.finished_run import GIVEN
 
 
@@ -23,8 +24,10 @@ def needs_of(function: Callable[..., Any], given: Collection[str]) -> tuple[str,
     names = [p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
     needs = tuple(name for name in names if name in GIVEN and name not in given)
     required = {p.name for p in parameters if p.default is p.empty and p.name in names}
-    unknown = sorted(required - set(needs) - set(given)) or sorted(set(given) - set(names))
-    if unknown:
+    if superfluous := sorted(set(given) - set(names)):
+        hint = near_miss(superfluous[0], names)
+        raise VoleryError(f"it has no parameter '{superfluous[0]}', which has a value{hint}")
+    if unknown := sorted(required - set(needs) - set(given)):
         raise VoleryError(
             f"its parameter '{unknown[0]}' is neither one that a run gives ({', '.join(GIVEN)}) "
             "nor one with a given value"

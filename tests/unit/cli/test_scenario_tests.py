@@ -146,6 +146,8 @@ def test_a_replay_goes_on_until_the_failure_is_final(hop, tmp_path):
     assert replay("") == ""
     assert replay("", "--seconds", 2) == " --seconds 2.0"
     assert replay("by_s = 1.5\n" + FAST.format(limit=0.3)) == " --seconds 2.5"
+    always = '[[expect]]\nkind = "formula"\nformula = "always(speed < 0.3 and z < 9)"\n'
+    assert 1.0 < float(replay("by_s = 0.5\n" + always).split()[1]) < 3.0
 
 
 def test_files_of_a_test_are_no_tests(hop, tmp_path):
@@ -181,6 +183,35 @@ def test_saved_scenarios_find_the_code_beside_the_test(hop, tmp_path, monkeypatc
         again = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
         assert again.exit_code == 1, again.output
         assert "own_limits:is_low: -" in again.output
+
+
+def test_whole_numbers_are_varied(hop, tmp_path):
+    path = hop(seconds=0.1)
+    words = "--vary", "uavs[0].count=1:3", "--seeds", 12, "--jobs", 1, "--no-logs", "--json"
+    done = test(path, *words)
+    assert done.exit_code == 0, done.output
+    flights = json.loads(done.stdout)["scenarios"][0]["flights"]
+    assert {flight["changes"]["uavs[0].count"] for flight in flights} == {1, 2, 3}
+
+
+def test_what_a_function_prints_is_not_in_the_json(hop, tmp_path):
+    path = hop('[[expect]]\nkind = "predicate"\nfunction = "prints:prints"\n', seconds=0.1)
+    (tmp_path / "prints.py").write_text(
+        "def prints(flight):\n    print('words')\n    return True\n"
+    )
+    done = test(path, "--trust", "--json")
+    assert json.loads(done.stdout)["passed"]
+    assert "words" in done.stderr
+
+
+def test_a_function_that_exits_fails_its_flight_alone(hop, tmp_path):
+    hop('[[expect]]\nkind = "predicate"\nfunction = "exits:exits"\n', seconds=0.1, name="a.toml")
+    hop(seconds=0.1, name="b.toml")
+    (tmp_path / "exits.py").write_text("import sys\ndef exits(flight):\n    sys.exit(0)\n")
+    done = test("a.toml", "b.toml", "--trust", "--no-logs")
+    assert done.exit_code == 1
+    assert "SystemExit: 0 (exits.py:3)" in done.output
+    assert "1 of 2 flights failed" in done.output
 
 
 def test_a_folder_holds_tests_and_other_files(hop, tmp_path):
@@ -301,6 +332,7 @@ BAD = {
     ("hop.toml", "--vary", "wind"): "--vary: KEY=LOW:HIGH, such as wind=0:6, not 'wind'",
     ("hop.toml", "--vary", "wind=3:1"): "3 must be below 1",
     ("hop.toml", "--vary", "wand=1:3"): "--vary wand=1: hop: unknown key 'wand'; did you mean",
+    ("hop.toml", "--vary", "wind=0:inf"): "--vary wind=0:inf: the range must be finite",
     ("hop.toml", "--vary", "wind=1:3", "--vary", "wind=0:2"): "'wind' is given more than once",
     ("hop.toml", "--vary", "types.brid.mass_kg=1:2"): "no type 'brid'; did you mean 'bird'?",
     ("hop.toml", "--vary", "seed=1:9"): "--seeds N --first-seed M varies the seed",

@@ -38,7 +38,7 @@ def test_the_view_is_around_the_first_failure(drawn):
     assert axes.get_xlim() == pytest.approx((10.0 - 15.0, 10.0 + 15.0))
     assert "outside" in axes.get_title()
     labels = axes.get_legend_handles_labels()[1]
-    assert any(label.startswith("its velocity (1.0 m/s)") for label in labels)
+    assert any(label.startswith("its horizontal velocity (1.0 m/s)") for label in labels)
     assert "start" in labels
 
 

@@ -28,6 +28,15 @@ def breaks(flight):
     raise ValueError("a reason")
 
 
+def exits(flight):
+    raise SystemExit(0)
+
+
+def writes(flight):
+    flight.position_map[:] = 0.0
+    return True
+
+
 def says_nothing(flight):
     return None
 
@@ -65,7 +74,13 @@ def test_a_number_is_a_margin_and_a_bool_has_none():
 
 @pytest.mark.parametrize(
     ("function", "reason"),
-    [("breaks", "ValueError: a reason"), ("says_nothing", "NoneType"), ("is_nan", "NaN")],
+    [
+        ("breaks", "ValueError: a reason (test_predicates.py:"),
+        ("exits", "SystemExit: 0"),
+        ("writes", "read-only"),
+        ("says_nothing", "NoneType"),
+        ("is_nan", "NaN"),
+    ],
 )
 def test_functions_that_fail_are_errors(function, reason):
     verdict = verdict_on(function)
@@ -77,8 +92,10 @@ def test_functions_that_fail_are_errors(function, reason):
     ("function", "keys", "reason"),
     [
         ("missing", {}, "is no function"),
+        ("climb", {}, "is no function; did you mean 'climbs'?"),
         ("wants_more", {}, "parameter 'colour'"),
-        ("is_far", {"parameters": {"speed": 3}}, "parameter 'speed'"),
+        ("is_far", {"parameters": {"speed": 3}}, "has no parameter 'speed', which has a value"),
+        ("climbs", {"parameters": {"min_hight_m": 3}}, "did you mean 'min_height_m'?"),
         ("climbs_by_odometry", {}, "reads topics: name them in 'topics'"),
     ],
 )
@@ -171,3 +188,29 @@ def test_a_function_reads_messages():
     (verdict,) = judged_flight(parse_scenario(hop)).verdicts
     assert verdict.outcome is Outcome.PASSED, verdict.text
     assert 0.0 < verdict.margin < 2.0
+
+
+def test_an_unknown_uav_is_an_error():
+    verdict = verdict_on("is_far", uavs=["uav7"])
+    assert (verdict.outcome, verdict.text) == (Outcome.ERROR, "no UAV 'uav7'; did you mean 'uav1'?")
+
+
+def test_a_flight_can_be_changed_again_afterwards():
+    run = run_of(flight_of([EAST]), expectation("is_far"))
+    Judge(run.scenario).verdicts(run)
+    run.flight.position_map[0, 0, 0] = 1.0
+
+
+def test_a_topic_that_never_comes_is_named():
+    hop = {
+        "name": "hop",
+        "duration_s": 0.5,
+        "types": {"bird": {"airframe": "f450", "sensors": [{"kind": "odometry"}]}},
+        "uavs": [{"type": "bird", "position_m": [0.0, 0.0]}],
+        "expect": [
+            expectation("climbs_by_odometry", topics=["odmo"]),
+            {"kind": "topic_value", "topic": "odmo", "field": "child_frame_id", "equals": ""},
+        ],
+    }
+    for verdict in judged_flight(parse_scenario(hop)).verdicts:
+        assert "no message on /uav1/odmo; did you mean '/uav1/odom'?" in verdict.text

@@ -24,7 +24,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from volery.core.errors import GraphError, NodeError, VoleryError
+from volery.core.errors import FAILURES, GraphError, NodeError, VoleryError
 from volery.graph.graph import check_period
 from volery.graph.message_copies import copy_message, receive_message
 from volery.graph.messages import Published, message_type
@@ -453,7 +453,7 @@ class Node(ParameterMethods):
             result = callback()
             if is_coroutine(result):
                 advance(result, lambda rest: self.__run(rest, occasion))
-        except Exception as error:
+        except FAILURES as error:
             if client:
                 cause = f"node {self.full_name}: {occasion}, caused by {client}"
                 _log.warning("%s, failed", cause, exc_info=error)
@@ -474,11 +474,11 @@ class Node(ParameterMethods):
                 raise TypeError(f"returned {response!r}, not the response")
         except VoleryError:
             raise
-        except Exception as error:
+        except FAILURES as error:
             raise self.__failure(error, occasion) from error
         return response
 
-    def __failure(self, error: Exception, occasion: str) -> NodeError:
+    def __failure(self, error: BaseException, occasion: str) -> NodeError:
         now_ns = self.__now_ns()
         what = str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
         client = f"; its last message of a client came from {self.__last_client}"

@@ -23,7 +23,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from volery.core.errors import ScenarioError, VoleryError
+from volery.core.errors import FAILURES, ScenarioError, VoleryError
+from volery.core.near_names import near_miss
 from volery.graph.nodes.failures import add_frames, location_of
 from volery.graph.nodes.imports import advice_for_missing, provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
@@ -43,7 +44,7 @@ def start_node(
     node_class = find_node(entry, where, access)
     try:
         node: Node = make_node(node_class, Launch(context, namespace, entry.parameters))
-    except Exception as error:
+    except FAILURES as error:
         _check_base(getattr(error, "obj", None), entry, where)
         raise _broken(f"{where}: node '{entry.node}' does not start", error) from error
     _check_base(node, entry, where)
@@ -112,9 +113,11 @@ def find_function(path: str, where: str, access: ScenarioAccess) -> Callable[...
         )
     with _also_from(*access.module_folders):
         module = _import(path.partition(":")[0], f"{where}: '{path}' cannot be imported", access)
-    found = getattr(module, path.partition(":")[2], None)
+    name = path.partition(":")[2]
+    found = getattr(module, name, None)
     if not callable(found):
-        raise ScenarioError(f"{where}: '{path}' is no function{_source_of(module)}")
+        hint = near_miss(name, vars(module)).rstrip(".")
+        raise ScenarioError(f"{where}: '{path}' is no function{hint}{_source_of(module, access)}")
     function: Callable[..., Any] = found
     return function
 
@@ -188,8 +191,10 @@ def _find_class(path: str, where: str, access: ScenarioAccess) -> type[Any]:
     try:
         found = getattr(module, class_name)
     except AttributeError:
+        hint = near_miss(class_name, vars(module)).rstrip(".")
         raise ScenarioError(
-            f"{where}: module '{module_name}' has no class '{class_name}'{_source_of(module)}"
+            f"{where}: module '{module_name}' has no class '{class_name}'{hint}"
+            f"{_source_of(module, access)}"
         ) from None
     if not (isinstance(found, type) and issubclass(found, Node)):
         raise ScenarioError(
@@ -202,7 +207,7 @@ def _import(name: str, failure: str, access: ScenarioAccess) -> ModuleType:
     """Imports a module. Raises `ScenarioError` with the failure and its reason."""
     try:
         return importlib.import_module(name)
-    except Exception as error:
+    except FAILURES as error:
         missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
         if missing and f"{name}.".startswith(f"{missing}."):
             folders = " or ".join(
@@ -214,9 +219,11 @@ def _import(name: str, failure: str, access: ScenarioAccess) -> ModuleType:
         raise _broken(failure, error, advice_for_missing(missing or "")) from error
 
 
-def _source_of(module: ModuleType) -> str:
+def _source_of(module: ModuleType, access: ScenarioAccess) -> str:
     """Returns which file a module came from: an installed package may have the name of a file."""
     file = getattr(module, "__file__", None)
+    if file is not None and Path(file).parent in {f.resolve() for f in access.module_folders}:
+        return ""
     if file is None:
         return "; the name is that of a module of Python or of ROS: rename your file"
     return f"; Python finds {file} under this name: if your file has the same name, rename it"
@@ -234,7 +241,7 @@ def _hint(found: Any) -> str:
     )
 
 
-def _broken(what: str, error: Exception, advice: str = "") -> ScenarioError:
+def _broken(what: str, error: BaseException, advice: str = "") -> ScenarioError:
     """Returns an error of the node's code, with its line and the frames of the user's files."""
     kind = "" if isinstance(error, VoleryError) else f"{type(error).__name__}: "
     failure = ScenarioError(f"{what}: {kind}{error}{location_of(error)}{advice}")
