@@ -15,7 +15,6 @@ from volery.core.plurals import counted
 from volery.core.whole_files import new_partial, put_in_place
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag", "ros2bag": "ROS 2 bag", "ulog": "ULog"}
-VERDICTS = "/volery/verdicts"
 _RECOVERED = ("mcap", "bag")
 """Formats that `volery recover` reads."""
 
@@ -27,6 +26,7 @@ def show_log(path: Path) -> bool:
 
     Raises `RecordingError` if the file is no log.
     """
+    from volery.bridges.logs.playback import OF_WHOLE_FLIGHT
     from volery.logs.summary import summarize_log
 
     summary = summarize_log(path)
@@ -39,8 +39,8 @@ def show_log(path: Path) -> bool:
     if rows:
         echo_line("")
         print_table(("topic", "type", "messages", "rate"), rows, right=(2, 3))
-    if any(topic.topic == VERDICTS for topic in summary.topics):
-        _print_verdicts(path)
+    for topic in {each.topic for each in summary.topics}.intersection(OF_WHOLE_FLIGHT):
+        _print_verdicts(path, topic)
     if summary.problem:
         recovery = f"; `volery recover {path}` writes what is readable"
         complain(f"{path}: {summary.problem}{recovery if summary.format in _RECOVERED else ''}")
@@ -48,14 +48,14 @@ def show_log(path: Path) -> bool:
     return True
 
 
-def _print_verdicts(path: Path) -> None:
+def _print_verdicts(path: Path, topic: str) -> None:
     """Prints the last verdicts of a log; of a damaged one, those that can be read."""
     from volery.logs import open_log
     from volery.verdicts.live_verdicts import verdicts_of
 
     last: Any = None
     with open_log(path) as log, suppress(RecordingError):
-        for logged in log.messages(VERDICTS):
+        for logged in log.messages(topic):
             last = logged.message
     if last is not None:
         echo_line("")

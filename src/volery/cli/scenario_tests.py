@@ -252,12 +252,13 @@ def _fitted(variation: Variation, scenario: Scenario) -> Variation:
 
     Raises `ScenarioError` if the scenario has no such key, or rejects an end of the range.
     """
+    problem = _problem(variation, scenario)
+    if not problem:
+        return variation
     whole = replace(variation, is_whole=True)
-    if _problem(variation, scenario) and not _problem(whole, scenario):
-        return whole
-    if problem := _problem(variation, scenario):
+    if _problem(whole, scenario):
         raise ScenarioError(problem)
-    return variation
+    return whole
 
 
 def _problem(variation: Variation, scenario: Scenario) -> str:

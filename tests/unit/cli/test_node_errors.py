@@ -48,6 +48,11 @@ class High(Node):
             raise RuntimeError("too high")
 
 
+class Leaves(Broken):
+    def helper(self):
+        raise SystemExit(0)
+
+
 class Deep(Broken):
     def helper(self):
         json.loads("{")
@@ -132,6 +137,12 @@ def test_the_first_of_two_errors_ends_the_flight_and_its_log_is_whole(run):
     assert summarize(log).problem == ""
 
 
+def test_a_node_that_exits_is_an_error(run):
+    result, _ = run("Leaves")
+    assert result.exit_code == 2
+    assert "in its timer (on_timer): SystemExit: 0 (broken_leaves.py:" in result.output
+
+
 def test_a_failed_node_may_fail_the_flight(run):
     assert run("Broken", "--fail-on", "crash")[0].exit_code == 2
     assert run("Broken", "--fail-on", "crash,node-error")[0].exit_code == 1
@@ -142,7 +153,7 @@ def test_errors_of_volery_and_of_libraries_point_to_the_users_line_too(run):
     assert "carries std_msgs/msg/String, not a str (broken_wrong.py:23)" in output
     output = run("Deep")[0].output
     assert "JSONDecodeError" in output
-    assert "(broken_deep.py:38)" in output
+    assert "(broken_deep.py:43)" in output
     assert "json/decoder.py" not in output
 
 
@@ -156,5 +167,5 @@ def test_a_constructor_that_fails_shows_its_line(run):
     result, _ = run("Unborn")
     assert result.exit_code == 2
     assert "does not start: AttributeError: " in result.output
-    assert "(broken_unborn.py:44)" in result.output
-    assert 'broken_unborn.py", line 44, in __init__' in result.output
+    assert "(broken_unborn.py:49)" in result.output
+    assert 'broken_unborn.py", line 49, in __init__' in result.output

@@ -171,18 +171,31 @@ def test_saved_scenarios_find_the_code_beside_the_test(hop, tmp_path, monkeypatc
     )
     (tmp_path / "a" / "limits_of_own.py").write_text("LIMIT = 0.5\n")
     vary = "--vary", "wind=0:3", "--trust", "--jobs", 1, "--out", tmp_path / "out"
-    drawn = test(path, "--json", *vary)
-    (flight,) = json.loads(drawn.stdout)["scenarios"][0]["flights"]
-    searched = json.loads(test(path, "--json", "--search", 3, "--sampler", "random", *vary).stdout)
-    replays = [flight["replay"], searched[0]["failure"]["replay"]]
-    assert "found.toml" in replays[1]
-    for name in ("own_limits", "limits_of_own"):
-        monkeypatch.delitem(sys.modules, name)
-    for replay in replays[1:]:
-        words = shlex.split(replay)[1:-1]
-        again = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
+
+    def check(replay):
+        for name in ("own_limits", "limits_of_own"):
+            monkeypatch.delitem(sys.modules, name)
+        again = CliRunner().invoke(app, [*shlex.split(replay)[1:-1], "--fail-on", "expectation"])
         assert again.exit_code == 1, again.output
         assert "own_limits:is_low: -" in again.output
+
+    drawn = json.loads(test(path, "--json", *vary).stdout)
+    check(drawn["scenarios"][0]["flights"][0]["replay"])
+    searched = json.loads(test(path, "--json", "--search", 3, "--sampler", "random", *vary).stdout)
+    assert "found.toml" in searched[0]["failure"]["replay"]
+    check(searched[0]["failure"]["replay"])
+
+
+def test_a_shortened_run_leaves_pending_what_may_still_come(hop):
+    path = hop('[[expect]]\nkind = "arrives"\nposition_m = [0.0, -90.0]\n' + FAST.format(limit=0.3))
+    words = ["run", str(path), "--seconds", "1.5"]
+    short = CliRunner().invoke(app, words)
+    assert short.exit_code == 0
+    assert re.search(r"pending +arrives", short.output)
+    assert re.search(r"failed +speed", short.output)
+    strict = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
+    assert strict.exit_code == 1
+    assert re.search(r"failed +arrives", strict.output)
 
 
 def test_whole_numbers_are_varied(hop, tmp_path):
@@ -298,6 +311,8 @@ def test_a_search_keeps_what_a_test_keeps(hop, tmp_path):
     from volery.logs import open_log
 
     assert open_log(log)["/uav1/odom"]["pose.pose.position.z"].max() > 0.5
+    info = CliRunner().invoke(app, ["info", log])
+    assert re.search(r"passed +no contact: .*\nfailed +speed", info.output)
     assert Path(image).read_bytes().startswith(b"\x89PNG")
     cases = ElementTree.parse(junit).getroot().findall("testsuite/testcase")
     assert [case.find("failure") is None for case in cases] == [True, False]

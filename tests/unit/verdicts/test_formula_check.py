@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_runs import flight_of, line, run_of
 
-from volery.scenario.formulas import Comparison, Connective, Temporal, parse_formula
+from volery.scenario.formulas import Comparison, Connective, Temporal, is_invariant, parse_formula
 from volery.verdicts import Outcome
 from volery.verdicts.judging import Judge
 
@@ -172,6 +172,22 @@ def test_formulas_that_cannot_be_judged_are_errors(formula, reason):
 def test_formulas_that_are_refused(formula, reason):
     with pytest.raises(ValueError, match=reason.replace("(", r"\(").replace(")", r"\)")):
         parse_formula(formula)
+
+
+@pytest.mark.parametrize(
+    ("formula", "is_final"),
+    [
+        ("z > 1", True),
+        ("always(z > 1 or x < 2) and y < 3", True),
+        ("eventually(z > 1)", False),
+        ("always(z > 1) and eventually(x > 2)", False),
+        ("always(eventually(z > 1, 0, 2))", False),
+        ("not always(z > 1)", False),
+        ("until(z > 1, x > 2)", False),
+    ],
+)
+def test_failures_that_are_final(formula, is_final):
+    assert is_invariant(parse_formula(formula)) is is_final
 
 
 def test_the_text_names_the_comparison_that_decides():
