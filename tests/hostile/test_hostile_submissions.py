@@ -48,7 +48,7 @@ def started(self):
         found.append("can write")
     except OSError:
         pass
-    raise SystemExit(f"Exception: reaches {{found}}")
+    raise SystemExit(f"reaches {{found}}")
 """
 CHEATS = """
 def started(self):
@@ -106,9 +106,9 @@ def test_a_submission_reaches_nothing_but_its_uav(tmp_path, folder, tcp_port):
     write_controller(folder / "ann.py")
     names = [str(folder / "ann.py"), str(tmp_path), str(Path.home() / ".bashrc"), "/etc/passwd"]
     write_controller(folder / "reads.py", READS.format(names=names, port=tcp_port))
-    assert graded(tmp_path, folder)["reads"].problems == [
-        "seed 1: the node did not start: Exception: reaches []"
-    ]
+    [problem] = graded(tmp_path, folder)["reads"].problems
+    assert problem.startswith("seed 1: the node did not start: ")
+    assert "SystemExit: reaches [] (submission.py:" in problem
 
 
 @pytest.fixture
