@@ -174,7 +174,7 @@ class CommandLineFlight:
         code = code if report_written else code or USER_ERROR
         failures = [] if code else self._checks.failures()
         for line in failures:
-            echo_line(f"failed: {line}", err=True)
+            echo_line(line, err=True)
         if not code and self._options.page is not None and not self._options.exit_at_end:
             self._stay()
         return FAILED if failures else code

@@ -73,14 +73,15 @@ class FlightChecks:
         return FAILED if fails else USER_ERROR
 
     def failures(self) -> list[str]:
-        """Returns what has failed, a line each."""
+        """Returns what has failed or could not be judged, a line each."""
         counts, simulation = "expectation" in self._kinds, self._simulation
-        failures = [v.describe() for v in self._verdicts if counts and not v.is_passed]
+        judged = self._verdicts if counts else ()
+        failures = [f"{v.outcome}: {v.describe()}" for v in judged if not v.is_passed]
         if "crash" in self._kinds:
             crashed = [name for name, uav in simulation.uavs.items() if uav.crashed]
-            failures += [f"{name} has crashed" for name in crashed]
+            failures += [f"failed: {name} has crashed" for name in crashed]
         if "contact" in self._kinds:
             contacts = (e for e in simulation.diagnostics.events if str(e.kind) in _CONTACTS)
             first = next(contacts, None)
-            failures += [] if first is None else [f"first contact: {first.describe()}"]
+            failures += [] if first is None else [f"failed: first contact: {first.describe()}"]
         return failures

@@ -9,6 +9,7 @@ import typer
 
 from volery.cli.error_reporting import guarded
 from volery.cli.options import TracebackOption
+from volery.core.errors import ScenarioError
 
 
 @guarded
@@ -103,8 +104,9 @@ def judge(
         ),
     ] = None,
     sampler: Annotated[
-        Literal["tpe", "random"], typer.Option(help="Set what proposes values for --search.")
-    ] = "tpe",
+        Literal["tpe", "random"] | None,
+        typer.Option(help="Set what proposes values for --search; default: tpe."),
+    ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the verdicts as JUnit XML.")
     ] = None,
@@ -140,9 +142,11 @@ def judge(
         trust=trust,
     )
     if search is None:
+        if sampler is not None:
+            raise ScenarioError("--sampler proposes values for --search, which is not given")
         passed = report_tests(options, junit, as_json=as_json)
     else:
-        passed = report_search(options, search, sampler, junit, as_json=as_json)
+        passed = report_search(options, search, sampler or "tpe", junit, as_json=as_json)
     if not passed:
         raise typer.Exit(1)
 

@@ -43,6 +43,15 @@ _PATTERNS = {
     "^[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$": "a topic of small letters, digits, _ and / is needed",
     r"^\w+/msg/\w+$": "a type such as std_msgs/msg/String is needed",
     r"^(\w[\w-]*|[\w.]+:\w+)$": "the name of a node, or module:Class, is needed",
+    r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$": "a function is needed, as module:function",
+    r"^/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*$": "a topic of letters, digits, _ and / is needed",
+    r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$": "a topic or service is needed",
+    r"^(/[A-Za-z_][A-Za-z0-9_]*)*$": "a namespace such as /uav1 is needed",
+    r"^\w+(\.\w+)*$": "the path of a field, such as pose.position.z, is needed",
+    r"^[A-Za-z0-9][A-Za-z0-9_.-]*$": "a name of letters, digits, _, - and . is needed",
+    r"^[A-Za-z_]\w*$": "the name of a class is needed",
+    r"^/[\w*?/]+$": "an absolute topic or service is needed; * and ? stand for others",
+    r"^uav[1-9]\d*$": "the name of a UAV, such as uav2, is needed",
 }
 """By the pattern that a text does not match."""
 

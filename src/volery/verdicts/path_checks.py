@@ -28,7 +28,7 @@ from volery.scenario.expectations import (
     SpeedExpectation,
 )
 from volery.verdicts.finished_run import FinishedRun
-from volery.verdicts.measures import area_m2, nearest_obstacle, nearest_pair
+from volery.verdicts.measures import MAX_CLEARANCE_M, area_m2, nearest_obstacle, nearest_pair
 from volery.verdicts.verdict import Finding, JudgmentError
 
 _MODE_CHANGE = re.compile(r"changed to (\w+)")
@@ -147,7 +147,8 @@ def clearance(run: FinishedRun, expectation: ClearanceExpectation) -> Finding:
     if found.uav < 0:
         raise JudgmentError("no UAV exists in this time")
     margin = found.distance_m - expectation.at_least_m
-    text = f"{found.distance_m:.2f} m"
+    or_more = " or more" if found.distance_m >= MAX_CLEARANCE_M else ""
+    text = f"{found.distance_m:.2f} m{or_more}"
     time_s = float(flight.times_s[found.sample])
     return Finding(text, margin, "m", time_s, flight.uavs[found.uav])
 

@@ -192,12 +192,13 @@ def _margin(value: Any, expectation: TopicValueExpectation, topic: str) -> float
     """Returns the margin of a value; without bounds, inf for an equal one, else -inf."""
     if value is MISSING:
         raise JudgmentError(f"a message on {topic} has no field '{expectation.field}'")
-    if expectation.equals is not None:
-        return math.inf if _plain(value) == expectation.equals else -math.inf
     number = _plain(value)
+    if expectation.equals is not None and isinstance(number, bool | int | float | str | None):
+        return math.inf if number == expectation.equals else -math.inf
     if isinstance(number, bool) or not isinstance(number, int | float):
         what = f"{expectation.field} of {topic} is {_shown(value)}"
-        raise JudgmentError(f"{what}, which is no number")
+        needed = "no number" if expectation.equals is None else "neither a number nor a text"
+        raise JudgmentError(f"{what}, which is {needed}")
     if math.isnan(number):
         raise JudgmentError(f"{expectation.field} of {topic} is not a number (NaN)")
     low = -math.inf if expectation.at_least is None else expectation.at_least
@@ -210,7 +211,10 @@ def _plain(value: Any) -> Any:
 
 
 def _shown(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else f"{value}"[:80]
+    if isinstance(value, float | np.floating):
+        return f"{value:.6g}"
+    is_plain = isinstance(value, str | int | np.generic | list | dict)
+    return f"{value}"[:80] if is_plain else f"a {type(value).__name__}"
 
 
 def _trajectories(

@@ -344,6 +344,7 @@ BAD = {
     ("hop.toml", "--search", "5"): "--search needs --vary KEY=LOW:HIGH or --seeds N",
     ("nothing",): "no scenario, file or folder 'nothing'",
     ("hovr",): "did you mean 'hover'?",
+    ("hop.toml", "--sampler", "random"): "--sampler proposes values for --search, which is not",
     ("hop.toml", "--vary", "wind"): "--vary: KEY=LOW:HIGH, such as wind=0:6, not 'wind'",
     ("hop.toml", "--vary", "wind=3:1"): "3 must be below 1",
     ("hop.toml", "--vary", "wand=1:3"): "--vary wand=1: hop: unknown key 'wand'; did you mean",

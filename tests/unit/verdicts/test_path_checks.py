@@ -103,6 +103,8 @@ def test_clearance():
     assert verdict.margin == pytest.approx(-0.5)
     later = {**expectation, "from_s": 3.0}
     assert verdict_on(flight_of([EAST]), later, scene=Posts([[4.0, 0.5]])).is_passed
+    far = verdict_on(flight_of([EAST]), expectation, scene=Posts([[4.0, 90.0]]))
+    assert (far.text, far.margin) == ("10.00 m or more", 9.0)
 
 
 @pytest.mark.parametrize(

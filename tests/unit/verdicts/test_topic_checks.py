@@ -90,11 +90,19 @@ def test_equal_values_have_no_margin():
     assert (verdict.time_s, verdict.uav) == (1.5, "")
     assert math.isnan(verdict.margin)
     assert not verdict_on({**expectation, "when": "always"}, topics=topics).is_passed
+    whole = verdict_on(expectation, topics={"/status": record([0.5], **{"data.phase": [topics]})})
+    assert whole.outcome is Outcome.ERROR
+    assert "neither a number nor a text" in whole.text
 
 
 @pytest.mark.parametrize(
     ("value", "reason"),
-    [(MISSING, "has no field 'z'"), (float("nan"), "not a number"), ("high", "is no number")],
+    [
+        (MISSING, "has no field 'z'"),
+        (float("nan"), "not a number"),
+        ("high", "is high, which is no number"),
+        (SimpleNamespace(x=1.0), "z of /uav1/odom is a SimpleNamespace, which is no number"),
+    ],
 )
 def test_values_that_cannot_be_compared_are_errors(value, reason):
     topics = {"/uav1/odom": record([1.0], z=[value])}
