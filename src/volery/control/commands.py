@@ -31,6 +31,8 @@ from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plant_types import Plant, RigidBody
 
 DEFAULT_RETURN_HEIGHT_M = 10.0
+_MODES = tuple(FlightMode)
+"""By their numbers."""
 
 
 class FleetCommands:
@@ -58,6 +60,7 @@ class FleetCommands:
         self._uavs = uavs
         self._bodies: NDArray[np.void] = uavs["body"]
         self._control_states: NDArray[np.void] = uavs["control_state"]
+        self._modes: NDArray[np.int64] = self._control_states["mode"]
         self._paths = SegmentStore(self._control_states)
 
     def __len__(self) -> int:
@@ -66,7 +69,7 @@ class FleetCommands:
 
     def mode(self, i: int) -> FlightMode:
         """Returns the flight mode of UAV `i`."""
-        return FlightMode(int(self._control_states["mode"][i]))
+        return _MODES[self._modes[i]]
 
     def is_braking(self, i: int) -> bool:
         """Returns whether UAV `i` still brakes before it holds its position."""
@@ -75,8 +78,7 @@ class FleetCommands:
     @property
     def modes(self) -> NDArray[np.int64]:
         """(N,) flight modes, as integers."""
-        modes: NDArray[np.int64] = self._control_states["mode"].copy()
-        return modes
+        return self._modes.copy()
 
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
         """Sets the time without setpoints after which UAV `i` (None: all) holds.

@@ -108,10 +108,18 @@ def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]
 
 
 @brief_kernel
-def fill_normal_rows(
-    keys: NDArray[np.uint64], counters: NDArray[np.int64], out: NDArray[np.float64]
+def fill_normal_draws(
+    keys: NDArray[np.uint64],
+    first_draw: NDArray[np.int64],
+    draw: int,
+    skipped: int,
+    out: NDArray[np.float64],
 ) -> None:
-    """Fills rows like `fill_normal` with a counter each: row i holds numbers counters[i].. ."""
+    """Fills rows with the numbers of draw `draw` of streams that began at draws `first_draw`.
+
+    Row i takes the next `out.shape[1]` numbers of keys[i], after `skipped` at its start.
+    """
     for i in range(out.shape[0]):
+        counter = skipped + out.shape[1] * (draw - first_draw[i])
         for j in range(out.shape[1]):
-            out[i, j] = normal(keys[i], counters[i] + j)
+            out[i, j] = normal(keys[i], counter + j)

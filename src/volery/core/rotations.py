@@ -29,9 +29,12 @@ def _components(array: ArrayLike) -> Sequence[Any]:
 
 def _together(*components: Any) -> Array:
     """Joins arrays or numbers along a new last axis."""
-    if all(type(component) is float for component in components):
+    if type(components[0]) is float:
         return np.array(components)
-    return np.stack(components, axis=-1)
+    joined = np.empty((*components[0].shape, len(components)))  # np.stack is several times slower
+    for k, component in enumerate(components):
+        joined[..., k] = component
+    return joined
 
 
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:

@@ -51,8 +51,9 @@ class SensorBank(Bank, Protocol):
     def faults(self) -> FaultTable:
         """Faults of the sensors, row by row."""
 
-    def is_wanted(self) -> bool:
-        """Returns whether the next measurement has receivers."""
+    @property
+    def wanted(self) -> Callable[[], bool] | None:
+        """Returns whether the next measurement has receivers; None: it is always made."""
 
 
 class Sink(Protocol):
@@ -311,7 +312,10 @@ class Engine:
 
     def collect_events(self) -> list[Event]:
         """Returns the events since the last call, oldest first."""
-        self._new_events += event_collection.drain(self.fleet, self.names)
+        if self.fleet.has_events:
+            self._new_events += event_collection.drain(self.fleet, self.names)
+        if not self._new_events:
+            return []
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
         self.num_events += len(events)
@@ -424,16 +428,18 @@ class Engine:
                 bank.schedule,
                 lag_ns=bank.lag_ns,
                 after_step=after_step,
-                wanted=bank.is_wanted,
+                wanted=bank.wanted,
             )
         return agenda
 
     def _due_step(self) -> int:
-        steps = [part.next_step() for part in self._due]
+        nearest = 1 << 62
+        for part in self._due:
+            step = part.next_step()
+            if step is not None and step < nearest:
+                nearest = step
         look_ns = self.collisions.next_look_ns
-        if look_ns is not None:
-            steps.append(-(-look_ns // self.dt_ns))
-        return min((s for s in steps if s is not None), default=1 << 62)
+        return nearest if look_ns is None else min(nearest, -(-look_ns // self.dt_ns))
 
     def _run_tick(self, tick: Tick) -> None:
         clock = self.stage_clock

@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from volery.core.clock import Schedule
 
 What = TypeVar("What")
 
 
-@dataclass(order=True)
+@dataclass(slots=True)
 class _Entry(Generic[What]):
-    due_step: int
     order: int
-    k: int = field(compare=False)
-    schedule: Schedule = field(compare=False)
-    lag_ns: int = field(compare=False)
-    what: What = field(compare=False)
-    wanted: Callable[[], bool] | None = field(compare=False)
+    k: int
+    schedule: Schedule
+    lag_ns: int
+    what: What
+    wanted: Callable[[], bool] | None
 
 
-@dataclass(frozen=True)
-class DueTask(Generic[What]):
+class DueTask(NamedTuple, Generic[What]):
     """The k-th firing of a schedule, nominally at `instant_ns`."""
 
     what: What
@@ -40,7 +38,8 @@ class Scheduler(Generic[What]):
 
     def __init__(self, dt_ns: int) -> None:
         self._dt_ns = dt_ns
-        self._heap: list[_Entry[What]] = []
+        self._heap: list[tuple[int, int, _Entry[What]]] = []
+        """Entries with the step at which they are due and their order."""
         self._added = 0
 
     def add(
@@ -58,41 +57,45 @@ class Scheduler(Generic[What]):
         tick ends.
         """
         first = _first_near(schedule, after_step * self._dt_ns - lag_ns)
-        entry = _Entry(0, self._added, first, schedule, lag_ns, what, wanted)
-        entry.due_step = self._step_of(entry)
-        while entry.due_step <= after_step:
+        entry = _Entry(self._added, first, schedule, lag_ns, what, wanted)
+        while self._step_at(entry, entry.k) <= after_step:
             entry.k += 1
-            entry.due_step = self._step_of(entry)
         self._added += 1
-        heapq.heappush(self._heap, entry)
+        heapq.heappush(self._heap, self._due(entry))
 
     def remove(self, what: What) -> None:
         """Removes `what`; restoring an earlier state does not add it again."""
-        self._heap = [entry for entry in self._heap if entry.what != what]
+        self._heap = [item for item in self._heap if item[2].what != what]
         heapq.heapify(self._heap)
 
     def next_step(self) -> int | None:
         """Returns the step of the next firing, None without one."""
-        if self._heap and ((first := self._heap[0]).wanted is None or first.wanted()):
-            return first.due_step
-        steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
-        return min(steps, default=None)
+        if not self._heap:
+            return None
+        step, _, first = self._heap[0]
+        if first.wanted is None or first.wanted():
+            return step
+        return self.next_step_of(lambda _what: True)
 
     def next_step_of(self, chosen: Callable[[What], bool]) -> int | None:
         """Returns the step of the next firing of the chosen entries, None without one."""
-        steps = (e.due_step for e in self._heap if chosen(e.what) and (not e.wanted or e.wanted()))
+        steps = (
+            step
+            for step, _, entry in self._heap
+            if chosen(entry.what) and (entry.wanted is None or entry.wanted())
+        )
         return min(steps, default=None)
 
     def pop_due(self, step: int) -> list[DueTask[What]]:
         """Returns all firings due at or before `step`, in order, and schedules the next ones."""
-        due = []
-        while self._heap and self._heap[0].due_step <= step:
-            entry = self._heap[0]
+        due: list[DueTask[What]] = []
+        heap = self._heap
+        while heap and heap[0][0] <= step:
+            entry = heap[0][2]
             if entry.wanted is None or entry.wanted():
                 due.append(DueTask(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
             entry.k += 1
-            entry.due_step = self._step_of(entry)
-            heapq.heapreplace(self._heap, entry)
+            heapq.heapreplace(heap, self._due(entry))
         return due
 
     def next_after(self, what: What, step: int) -> tuple[int, bool]:
@@ -100,27 +103,27 @@ class Scheduler(Generic[What]):
 
         The second value is whether `what` has fired at `step`.
         """
-        entry = next(entry for entry in self._heap if entry.what is what)
+        entry = next(entry for _, _, entry in self._heap if entry.what is what)
         if entry.k and self._step_at(entry, entry.k - 1) == step:
             return entry.k - 1, True
         return entry.k, False
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
-        return {"added": self._added, "k": {entry.order: entry.k for entry in self._heap}}
+        return {"added": self._added, "k": {order: entry.k for _, order, entry in self._heap}}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state; entries added since then are dropped."""
         counts: dict[int, int] = state["k"]
         self._added = state["added"]
-        self._heap = [entry for entry in self._heap if entry.order in counts]
-        for entry in self._heap:
+        entries = [entry for _, order, entry in self._heap if order in counts]
+        for entry in entries:
             entry.k = counts[entry.order]
-            entry.due_step = self._step_of(entry)
+        self._heap = [self._due(entry) for entry in entries]
         heapq.heapify(self._heap)
 
-    def _step_of(self, entry: _Entry[What]) -> int:
-        return self._step_at(entry, entry.k)
+    def _due(self, entry: _Entry[What]) -> tuple[int, int, _Entry[What]]:
+        return self._step_at(entry, entry.k), entry.order, entry
 
     def _step_at(self, entry: _Entry[What], k: int) -> int:
         return -(-(entry.schedule.instant_ns(k) + entry.lag_ns) // self._dt_ns)

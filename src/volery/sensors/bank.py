@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array
 from volery.core.clock import Schedule
+from volery.core.compiled import brief_kernel
 from volery.sensors.mount import Mount
 from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import Samples, SensorId
@@ -163,10 +164,15 @@ class NoisyBank:
         self._switch_on(rows, time_ns)
 
 
+@brief_kernel
 def saturate(readings: Array, full_scale: Array) -> None:
     """Cuts `readings` (S, M) in place at the full scale (M,), inf without one, of each column."""
-    np.minimum(readings, full_scale, out=readings)
-    np.maximum(readings, -full_scale, out=readings)
+    for i in range(readings.shape[0]):
+        for j in range(readings.shape[1]):
+            if readings[i, j] > full_scale[j]:
+                readings[i, j] = full_scale[j]
+            elif readings[i, j] < -full_scale[j]:
+                readings[i, j] = -full_scale[j]
 
 
 def uav_rows(sensors: Sequence[SensorId]) -> NDArray[np.int64]:

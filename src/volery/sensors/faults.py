@@ -6,7 +6,7 @@ measurements.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from typing import Any
@@ -228,10 +228,10 @@ class FaultableBank:
         """Delay from a measurement's time to its availability, ns."""
         return self.bank.lag_ns
 
-    def is_wanted(self) -> bool:
-        """Returns whether to sample; only camera banks are skipped without receivers."""
-        asks = getattr(self.bank, "is_wanted", None)
-        return asks is None or bool(asks())
+    @property
+    def wanted(self) -> Callable[[], bool] | None:
+        """Returns whether to sample; None: always. Only cameras are skipped without receivers."""
+        return getattr(self.bank, "is_wanted", None)
 
     @property
     def sensors(self) -> tuple[SensorId, ...]:

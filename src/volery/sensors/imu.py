@@ -21,7 +21,7 @@ from volery.core.clock import NS_PER_S
 from volery.sensors.bank import NoisyBank, SensorGroup, saturate
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel
-from volery.sensors.noise import gauss_markov
+from volery.sensors.noise import add_errors, gauss_markov
 from volery.sensors.samples import ImuSamples
 
 _MIN_ACCEL_RANGE_M_S2 = 19.6
@@ -75,6 +75,7 @@ class ImuBank(NoisyBank):
             dt,
         )
         self._turn_on = _axes(model.gyro_turn_on_bias_rad_s, model.accel_turn_on_bias_m_s2)
+        self._is_cold = model.gyro_warm_up_bias_rad_s > 0.0 or model.accel_warm_up_bias_m_s2 > 0.0
         self._cold = _axes(model.gyro_warm_up_bias_rad_s, model.accel_warm_up_bias_m_s2)
         self._warm_up_s = model.warm_up_time_constant_s
         self._full_scale = _axes(
@@ -104,12 +105,18 @@ class ImuBank(NoisyBank):
             reading,
         )
         if self._noise.enabled:
-            noise = self._noise.measurement(k)
-            reading += self._turn_on_bias + self._bias + self._white * noise[:, :6]
-            if self._cold.any():
+            add_errors(
+                reading,
+                self._noise.measurement(k),
+                self._turn_on_bias,
+                self._bias,
+                self._white,
+                self._wander.decay,
+                self._wander.step,
+            )
+            if self._is_cold:
                 age_s = (time_ns - self._start_ns) / NS_PER_S
                 reading += self._warm_up_bias * np.exp(-age_s / self._warm_up_s)[:, None]
-            self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 6:]
         saturate(reading, self._full_scale)
         return ImuSamples(
             self.sensors,

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.core import rng
 from volery.core.arrays import Array
+from volery.core.compiled import brief_kernel
 
 
 class NoiseStreams:
@@ -38,14 +39,17 @@ class NoiseStreams:
 
     def start(self) -> Array:
         """Returns the numbers of the start, (S, at_start)."""
-        return self._draw(np.zeros_like(self.first_k), self._at_start)
+        out = np.zeros((len(self.keys), self._at_start))
+        if self.enabled:
+            rng.fill_normal(self.keys, 0, out)
+        return out
 
     def measurement(self, k: int) -> Array:
         """Returns the numbers of measurement `k`, (S, per_measurement)."""
-        since_start = k - self.first_k
-        return self._draw(
-            self._at_start + self._per_measurement * since_start, self._per_measurement
-        )
+        out = np.zeros((len(self.keys), self._per_measurement))
+        if self.enabled:
+            rng.fill_normal_draws(self.keys, self.first_k, k, self._at_start, out)
+        return out
 
     def restart(self, rows: NDArray[np.int64], keys: NDArray[np.uint64] | None, k: int) -> None:
         """Restarts `rows` (R,): measurement `k` draws the numbers of a new sensor's first one.
@@ -66,12 +70,6 @@ class NoiseStreams:
         self.keys = np.array(state["keys"], np.uint64)
         self.first_k = np.array(state["first_k"], np.int64)
 
-    def _draw(self, counters: NDArray[np.int64], numbers: int) -> Array:
-        out = np.zeros((len(self.keys), numbers))
-        if self.enabled:
-            rng.fill_normal_rows(self.keys, counters, out)
-        return out
-
 
 class GaussMarkov(NamedTuple):
     """A first-order Gauss-Markov process in steps: b+ = decay b + step n, n standard normal."""
@@ -80,6 +78,28 @@ class GaussMarkov(NamedTuple):
     step: Array
     sigma: Array
     """Long-run standard deviation."""
+
+
+@brief_kernel
+def add_errors(
+    readings: Array,
+    noise: Array,
+    constant: Array,
+    bias: Array,
+    white: Array,
+    decay: Array,
+    step: Array,
+) -> None:
+    """Adds constant, bias and white noise to `readings` (S, M), and advances the bias by a step.
+
+    noise: (S, 2 M) normal numbers, first those of the white noise. constant, bias: (S, M). white:
+    (M,) standard deviations; decay, step: (M,), of `GaussMarkov`.
+    """
+    sensors, axes = readings.shape
+    for i in range(sensors):
+        for j in range(axes):
+            readings[i, j] += constant[i, j] + bias[i, j] + white[j] * noise[i, j]
+            bias[i, j] = decay[j] * bias[i, j] + step[j] * noise[i, axes + j]
 
 
 def gauss_markov(walk: ArrayLike, correlation_s: ArrayLike, dt_s: float) -> GaussMarkov:

@@ -51,7 +51,10 @@ class OdometryBank(NoisyBank):
         self._fleet = fleet
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
         self._drift = np.array([horizontal, horizontal, vertical, model.yaw_drift_rad_sqrt_m])
+        self._growth = self._drift**2
+        """Growth of the variances of position and yaw, m^2/m and rad^2/m."""
         self._twist_noise = np.repeat([model.velocity_noise_m_s, model.rate_noise_rad_s], 3)
+        self._twist_variance = read_only(np.tile(self._twist_noise**2, (len(self._rows), 1)))
         self._position_odom = fleet.state.position_map[self._rows].copy()
         self._yaw_error = np.zeros(len(group.sensors))
         self._flown = np.zeros(len(group.sensors))
@@ -77,9 +80,10 @@ class OdometryBank(NoisyBank):
             self._position_odom += walk[:, :3]
             self._yaw_error += walk[:, 3]
             twist += self._twist_noise * noise[:, 4:]
-            variance[:, [0, 1, 2, 5]] = self._flown[:, None] * self._drift**2
+            grown = self._flown[:, None] * self._growth
+            variance[:, :3], variance[:, 5] = grown[:, :3], grown[:, 3]
             # Effect of the yaw error on a straight path of any direction.
-            variance[:, :2] += (self._drift[3] ** 2 * self._flown**3 / 3.0)[:, None]
+            variance[:, :2] += (self._growth[3] * self._flown**3 / 3.0)[:, None]
         return OdometrySamples(
             self.sensors,
             time_ns,
@@ -88,7 +92,7 @@ class OdometryBank(NoisyBank):
             read_only(twist[:, :3].copy()),
             read_only(twist[:, 3:].copy()),
             read_only(variance),
-            read_only(np.tile(self._twist_noise**2, (len(self._rows), 1))),
+            self._twist_variance,
             is_ground_truth=False,
         )
 
@@ -112,11 +116,11 @@ class GroundTruthBank(Memoryless):
     def __init__(self, group: SensorGroup) -> None:
         super().__init__(group)
         self._taken = in_one_piece(self._rows)
+        self._no_variance = read_only(np.zeros((len(self._rows), 6)))
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:  # noqa: ARG002
         """Returns the present state of all S UAVs of the bank."""
         twist = _twist_body(fleet, self._rows)
-        zero = np.zeros((len(self._rows), 6))
         return OdometrySamples(
             self.sensors,
             time_ns,
@@ -124,8 +128,8 @@ class GroundTruthBank(Memoryless):
             read_only(fleet.state.attitude[self._taken].copy()),
             read_only(twist[:, :3].copy()),
             read_only(twist[:, 3:].copy()),
-            read_only(zero),
-            read_only(zero.copy()),
+            self._no_variance,
+            self._no_variance,
             is_ground_truth=True,
         )
 

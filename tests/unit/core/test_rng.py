@@ -58,7 +58,7 @@ def test_generator_is_reproducible():
 def test_rows_counted_by_themselves_are_the_same_numbers():
     keys = np.array([rng.stream_key(1, "a"), rng.stream_key(1, "b")])
     out = np.empty((2, 4))
-    rng.fill_normal_rows(keys, np.array([3, 1000]), out)
+    rng.fill_normal_draws(keys, np.array([7, 0]), 9, 3, out)
     # Not to the last bit: the compiler fuses multiplications and additions for each caller anew.
-    np.testing.assert_allclose(out[0], draw(keys[0], 4, 3), rtol=1e-12)
-    np.testing.assert_allclose(out[1], draw(keys[1], 4, 1000), rtol=1e-12)
+    np.testing.assert_allclose(out[0], draw(keys[0], 4, 3 + 4 * 2), rtol=1e-12)
+    np.testing.assert_allclose(out[1], draw(keys[1], 4, 3 + 4 * 9), rtol=1e-12)

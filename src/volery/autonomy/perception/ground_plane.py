@@ -16,7 +16,7 @@ _RADIUS_M = 13.0
 _NOISE_M = 0.05
 _ENOUGH, _BELOW_M = 8, 0.5
 """Number of cells with returns so far below the vehicle that give the height without a sonar."""
-_RIDGE = 8.0
+_RIDGE = 8.0 * np.eye(2)
 """Weight that regularizes the slope to zero if few returns are on the ground."""
 
 
@@ -56,7 +56,7 @@ class GroundPlane:
             residual = z - base - offset @ slope
             # Points well above the plane are trunks and leaves, not ground.
             weight = 1.0 / (1.0 + (np.maximum(residual, 0.0) / 0.4) ** 2 + (residual / 2.0) ** 2)
-            normal = (offset * weight[:, None]).T @ offset + _RIDGE * np.eye(2)
+            normal = (offset * weight[:, None]).T @ offset + _RIDGE
             slope = np.linalg.solve(normal, (offset * weight[:, None]).T @ (z - base)).astype(
                 np.float64
             )

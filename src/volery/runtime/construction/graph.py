@@ -132,7 +132,8 @@ def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
 
 def all_down(uavs: Mapping[str, Uav], events: Sequence[Event]) -> bool:
     """Returns whether every UAV has crashed, or has flown and landed."""
-    if any(uav.mode not in DOWN_MODES for uav in uavs.values()):  # most often the first one flies
-        return False
+    for uav in uavs.values():
+        if uav.mode not in DOWN_MODES:  # most often the first one flies
+            return False
     flown = {event.uav for event in events}
     return all(uav.mode is FlightMode.CRASHED or name in flown for name, uav in uavs.items())

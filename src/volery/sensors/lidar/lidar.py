@@ -63,8 +63,9 @@ def make_batch(
     uavs = np.atleast_1d(np.asarray(uav, dtype=np.int64))
 
     def column(values: ArrayLike, kind: type) -> NDArray[Any]:
-        # A copy: broadcasting a scalar gives a read-only view, which kernels are not compiled for.
-        return np.array(np.broadcast_to(np.asarray(values, dtype=kind), uavs.shape))
+        filled = np.empty(uavs.shape, kind)
+        filled[...] = values
+        return filled
 
     return RayBatch(
         uav=column(uavs, np.int64),
