@@ -22,7 +22,7 @@ from volery.scenario.data_file_bases import read_toml
 from volery.scenario.load import load_scenario
 from volery.server.uploads import scenario_builder
 from volery.server.uploads.scenario_builder import toml_of
-from volery.server.uploads.scenario_file import text_of
+from volery.server.uploads.validation import text_of
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
 from live_graph import LiveGraph

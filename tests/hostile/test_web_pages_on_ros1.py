@@ -7,8 +7,7 @@ from xmlrpc.client import ServerProxy, dumps
 import pytest
 
 from volery.bridges.ros1.environment import load_rospy, rospy_is_installed
-from volery.bridges.ros1.port_guards import guard_ports
-from volery.bridges.ros1.web_pages import is_of_a_page
+from volery.bridges.ros1.port_guards import guard_ports, is_of_a_page
 
 
 @pytest.mark.parametrize(

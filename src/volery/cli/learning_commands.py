@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import guarded
+from volery.cli.tables import print_table
 from volery.cli.terminal import echo_line
 
 _POLICY = typer.Argument(help="Shipped policy or .npz file.", metavar="POLICY")
@@ -74,9 +75,31 @@ def evaluate(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Evaluate a policy on episodes that no training uses."""
-    from volery.cli.evaluate import evaluate_and_show
+    _evaluate_and_show(policy, task, episodes=episodes, seed=seed, threads=threads, as_json=json)
 
-    evaluate_and_show(policy, task, episodes=episodes, seed=seed, threads=threads, as_json=json)
+
+def _evaluate_and_show(
+    policy: str, task: str | None, *, episodes: int, seed: int, threads: int, as_json: bool
+) -> None:
+    """Evaluates a policy and prints a table, or one JSON object."""
+    from json import dumps
+
+    from volery.learning.training import evaluate as evaluate_policy
+
+    found = evaluate_policy(policy, task=task, episodes=episodes, seed=seed, threads=threads)
+    if as_json:
+        echo_line(dumps(found.as_dict()))
+        return
+    interval = f"{found.success_low:.1%} to {found.success_high:.1%}"
+    rows = [
+        ("success", f"{found.success:.1%}", f"95 % confidence: {interval}"),
+        ("return", f"{found.mean_return:.3f}", ""),
+        ("length", f"{found.mean_length_s:.2f} s", ""),
+        *((f"reward {name}", f"{mean:.3f}", "") for name, mean in found.reward_terms.items()),
+        *((f"ends: {name}", f"{part:.1%}", "") for name, part in found.ends.items()),
+    ]
+    title = f"{found.task}, {found.episodes} episodes"
+    print_table((title, "mean", ""), rows, right=(1,))
 
 
 @guarded

@@ -6,6 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from volery.bridges.logs.reader import LogSummary, TopicSummary, summarize
 from volery.cli.error_reporting import complain, warn
 from volery.cli.tables import print_table
 from volery.cli.terminal import echo_line
@@ -27,9 +28,8 @@ def show_log(path: Path) -> bool:
     Raises `RecordingError` if the file is no log.
     """
     from volery.bridges.logs.playback import OF_WHOLE_FLIGHT
-    from volery.logs.summary import summarize_log
 
-    summary = summarize_log(path)
+    summary = _summary_of(path)
     start, end = summary.start_ns / NS_PER_S, summary.end_ns / NS_PER_S
     echo_line(f"file      {path}")
     echo_line(f"format    {_FORMATS[summary.format]}, {summary.size_bytes / 1e6:.2f} MB")
@@ -46,6 +46,38 @@ def show_log(path: Path) -> bool:
         complain(f"{path}: {summary.problem}{recovery if summary.format in _RECOVERED else ''}")
         return False
     return True
+
+
+def _summary_of(path: Path) -> LogSummary:
+    """Summarizes a log as `summarize`, and also ROS 2 bags (`ros2bag`) and ULog (`ulog`).
+
+    Raises `RecordingError` if the file cannot be read, is no log, or exceeds the limits of logs.
+    """
+    from volery.bridges.logs.bag_files import bag_size
+    from volery.logs.sources import log_kind, open_source
+
+    kind = log_kind(path)
+    if kind in ("mcap", "bag"):
+        return summarize(path)
+    source = open_source(path)
+    try:
+        seconds = (source.end_ns - source.start_ns) / NS_PER_S
+        topics = tuple(
+            TopicSummary(
+                name,
+                count.msgtype,
+                count.messages,
+                max(count.messages - 1, 0) / seconds if seconds > 0.0 else 0.0,
+            )
+            for name, count in source.topics.items()
+        )
+        messages = sum(topic.messages for topic in topics)
+        return LogSummary(
+            path, kind, bag_size(path), source.start_ns, source.end_ns, messages, topics,
+            source.problem,
+        )  # fmt: skip
+    finally:
+        source.close()
 
 
 def _print_verdicts(path: Path, topic: str) -> None:
@@ -65,7 +97,6 @@ def _print_verdicts(path: Path, topic: str) -> None:
 
 def recover_log(path: Path, out: Path | None) -> None:
     """Writes the readable part of a log as a valid log and prints its size."""
-    from volery.bridges.logs.reader import summarize
     from volery.bridges.logs.recovery import recover
 
     if out is None and not summarize(path).problem:

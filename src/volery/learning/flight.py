@@ -13,11 +13,14 @@ from volery.autonomy.policy import observation_terms
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.core.errors import ScenarioError, SensorError
 from volery.learning.draws import Draws
-from volery.learning.estimate import estimated_state
 from volery.runtime.environment_block import SampleArrays
 from volery.runtime.vectorized_simulation import VectorizedSimulation
 from volery.vehicle.fleet import FleetState
+
+_ODOMETRY = "odom"
+"""Sensor whose samples are the estimate of a UAV's motion."""
 
 
 class Flight:
@@ -72,7 +75,7 @@ class Flight:
         if not self._is_estimated:
             return self._state
         if self._estimate is None:
-            self._estimate = estimated_state(self.envs, self._state)
+            self._estimate = _estimated_state(self.envs, self._state)
         return self._estimate
 
     def seen_from(
@@ -127,6 +130,41 @@ class Flight:
     def to_heading(self, vectors_map: Array) -> Array:
         """Returns vectors (K, n, 3) of the map frame in the level heading frames."""
         return observation_terms.to_heading(self.state.attitude, vectors_map)
+
+
+def _estimated_state(envs: VectorizedSimulation, truth: FleetState) -> FleetState:
+    """Returns `truth`, arrays (K, n, ...), with pose, velocity and rates from the sensor `odom`.
+
+    Environments without a sample since their reset have the true ones. Raises `ScenarioError` for
+    a UAV without that sensor.
+    """
+    position, attitude = truth.position_map.copy(), truth.attitude.copy()
+    velocity, omega = truth.velocity_map.copy(), truth.omega_body.copy()
+    for number, uav in enumerate(envs.uav_names):
+        if _ODOMETRY not in envs.sensors[uav]:
+            raise ScenarioError(
+                f'{uav} has no sensor \'{_ODOMETRY}\': add one of kind "estimate" or "odometry" to '
+                "the scenario's type, or observe the ground truth"
+            )
+        sensor = envs.sensors[uav][_ODOMETRY]
+        has = sensor.has_sample
+        if not has.any():
+            continue
+        try:
+            sample = sensor.latest
+        except SensorError:
+            continue
+        position[has, number] = sample.position_odom[has]
+        attitude[has, number] = sample.attitude[has]
+        turned = rotations.rotate(sample.attitude[has], sample.velocity_body[has])
+        velocity[has, number] = turned
+        omega[has, number] = sample.omega_body[has]
+    return truth._replace(
+        position_map=position,
+        attitude=attitude,
+        velocity_map=velocity,
+        omega_body=np.asarray(omega),
+    )
 
 
 def _stacked(parts: list[SampleArrays]) -> SampleArrays:

@@ -12,12 +12,12 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 from typing import Protocol
 
-from volery.bridges.logs.bag_files import BagFiles
+from volery.bridges.logs.bag_files import BagFiles, bag_size
 from volery.bridges.logs.chunks import Chunk, ChunkedLog
 from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.records import LogRecord, file_signature, log_format
+from volery.bridges.logs.ros2_bags import sqlite_index, sqlite_records
 from volery.core.errors import RecordingError
-from volery.logs.sqlite_source import SqliteSource
 from volery.logs.topic_count import TopicCount
 from volery.logs.ulog_source import UlogSource
 
@@ -80,6 +80,41 @@ class ChunkSource:
         self._closing()
 
 
+class _SqliteSource:
+    """Reads the SQLite files of a bag; see `LogSource`. Closes `files` with itself.
+
+    Raises `RecordingError` if none of them is a bag or it exceeds the limits of logs.
+    """
+
+    def __init__(self, path: Path, files: BagFiles) -> None:
+        self._path, self._files = path, files
+        self._is_closed = False
+        index = sqlite_index(files)
+        self._problems = index.problems
+        self.start_ns, self.end_ns = index.start_ns, index.end_ns
+        self.topics = {
+            name: TopicCount(msgtype, index.counts[name])
+            for name, msgtype in sorted(index.types.items())
+        }
+
+    @property
+    def problem(self) -> str:
+        """Problems of the files, as far as they were read; empty for whole ones."""
+        return "; ".join(self._problems)
+
+    def records(self, topics: Set[str], start_ns: int, end_ns: int) -> Iterator[LogRecord]:
+        """Yields the records of `topics` from `start_ns` to before `end_ns`."""
+        if self._is_closed:
+            raise RecordingError(f"{self._path}: the log is closed; open it again")
+        size, range_ns = bag_size(self._path), (start_ns, end_ns)
+        yield from sqlite_records(self._files, size, topics, range_ns, self._problems)
+
+    def close(self) -> None:
+        """Removes unpacked files."""
+        self._is_closed = True
+        self._files.close()
+
+
 def open_source(path: Path) -> LogSource:
     """Opens a log of any format. Raises `RecordingError` if the file is missing or no log."""
     kind = log_kind(path)
@@ -90,7 +125,7 @@ def open_source(path: Path) -> LogSource:
     files, parts = BagFiles(path), list[ChunkedLog]()
     try:
         if not files.mcap:
-            return SqliteSource(path, files)
+            return _SqliteSource(path, files)
         parts += [open_chunks(file) for file in files.mcap]
         return ChunkSource(parts, files)
     except BaseException:

@@ -1,4 +1,7 @@
-"""Changes of a scenario in Python: keys, paths of keys, and short forms of common changes."""
+"""Changes of a scenario in Python: keys, paths of keys, and short forms of common changes.
+
+A path of keys, such as `world.wind.turbulence`, leads to a value in nested tables.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,6 @@ from pydantic import BaseModel
 from volery.core.errors import ScenarioError
 from volery.core.near_names import near_miss
 from volery.scenario.fleet_size import resized
-from volery.scenario.key_paths import with_key
 from volery.scenario.merging import merged
 from volery.scenario.sensor_sets import SENSOR_SETS, fit
 from volery.scenario.uav_types import with_airframe
@@ -20,6 +22,8 @@ from volery.scenario.uav_types import with_airframe
 _Data = dict[str, Any]
 _FIRST = re.compile(r"[^.\[\]]+")
 """First key of a path."""
+_PART = re.compile(r"[^.\[\]]+|\[\d+\]")
+_PATH = re.compile(r"[^.\[\]]+(\[\d+\])*(\.[^.\[\]]+(\[\d+\])*)*")
 _KEY_OF_TYPE = re.compile(r"types\.([^.\[\]]+)\.")
 
 
@@ -47,7 +51,7 @@ def with_keys(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -
     for path, value in changes.items():
         if path not in names:
             _check_type(path, result.get("types", {}), where)
-            result = with_key(result, path, value, where)
+            result = _with_key(result, path, value, where)
     plain: _Data = _plain(result)
     return plain
 
@@ -99,6 +103,48 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
+def _with_key(data: Mapping[str, Any], path: str, value: Any, where: str) -> dict[str, Any]:
+    """Returns `data` with another value at a path of keys.
+
+    `uavs[0].count` names an entry of a list, `types.*.airframe` the key of all tables. Tables on
+    the way that do not exist are created. A table as `value` merges into the old one, as in
+    `merged`. where: names the source in errors. Raises `ScenarioError` for a path that does not
+    exist.
+    """
+    if not _PATH.fullmatch(path):
+        raise ScenarioError(
+            f"{where}: '{path}' is no path of keys; write 'world.wind.turbulence' or "
+            "'uavs[0].count'"
+        )
+    result: dict[str, Any] = _changed(data, _PART.findall(path), value, f"{where}: key '{path}'")
+    return result
+
+
+def _changed(node: Any, parts: Sequence[str], value: Any, where: str) -> Any:
+    if isinstance(node, BaseModel):
+        node = node.model_dump(exclude_unset=True)
+    if not parts:
+        is_merged = isinstance(node, Mapping) and isinstance(value, Mapping)
+        return merged({"": node}, {"": value})[""] if is_merged else value
+    part, rest = parts[0], parts[1:]
+    if part.startswith("["):
+        return _with_entry(node, int(part[1:-1]), rest, value, where)
+    node = {} if node is None else node
+    if not isinstance(node, Mapping):
+        raise ScenarioError(f"{where}: '{part}' is not inside a table; name an entry as [0]")
+    if part == "*":
+        return {key: _changed(inner, rest, value, where) for key, inner in node.items()}
+    return {**node, part: _changed(node.get(part), rest, value, where)}
+
+
+def _with_entry(node: Any, index: int, rest: Sequence[str], value: Any, where: str) -> list[Any]:
+    entries = list(node) if isinstance(node, list | tuple) else []
+    if index >= len(entries):
+        raise ScenarioError(f"{where}: there is no entry [{index}]; the list has {len(entries)}")
+    entries[index] = _changed(entries[index], rest, value, where)
+    return entries
+
+
 def _with_uavs(data: _Data, uavs: Any, where: str) -> _Data:
     if isinstance(uavs, bool) or not hasattr(uavs, "__index__"):
         raise ScenarioError(
@@ -111,11 +157,11 @@ def _with_uavs(data: _Data, uavs: Any, where: str) -> _Data:
 def _with_wind(data: _Data, wind: Any, where: str) -> _Data:
     if not isinstance(wind, Mapping | BaseModel):
         wind = {"velocity_m_s": wind}
-    return with_key(data, "world.wind", wind, where)
+    return _with_key(data, "world.wind", wind, where)
 
 
 def _with_weather(data: _Data, weather: Any, where: str) -> _Data:
-    return with_key(data, "world.weather", weather, where)
+    return _with_key(data, "world.weather", weather, where)
 
 
 def _with_airframe(data: _Data, airframe: str, _where: str) -> _Data:

@@ -4,14 +4,17 @@ Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may fol
 other units (see `inventory_columns`); others are ignored. An empty field means "not measured", as
 do the marks of R, pandas, Excel and GIS programs (`NA`, `nan`, `#N/A`, -9999). Species may have any
 name (see `species_map`). All invalid rows are reported together, with their row numbers in the
-file. `core.text_tables` reads the fields: where they are not separated by commas, a number may have
-a decimal comma, and then all have.
+file. A warning tells of numbers that are possible but most likely in another unit.
+`core.text_tables` reads the fields: where they are not separated by commas, a number may have a
+decimal comma, and then all have.
 """
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +23,9 @@ from numpy.typing import NDArray
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.core.text_tables import is_not_measured, number_in, read_table
-from volery.world.inventory_checks import warn_of_units
 from volery.world.inventory_columns import REQUIRED, ColumnOf, columns_of
+
+_log = logging.getLogger(__name__)
 
 _MARKS = (-999.0, -9999.0, -99999.0)
 """Numbers that stand for values that were not measured."""
@@ -30,6 +34,11 @@ _SHOWN_FAULTS = 20
 _SHOWN_LETTERS = 20
 _THICKEST_CM, _TALLEST_M = 1500.0, 130.0
 """Limits beyond any living tree: larger numbers are errors of units."""
+_THINNEST_USUAL_CM, _THICKEST_USUAL_CM = 1.0, 400.0
+"""Inventories begin at 1 cm (that of Barro Colorado) or more; few giants exceed 4 m."""
+_SLENDEREST = 500.0
+"""Height by diameter; the slenderest trees of dense stands reach about 200."""
+_TOGETHER_M = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +103,7 @@ def read_inventory(path: str | Path) -> Inventory:
         plural = "row" if len(faults) == 1 else "rows"
         raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
     measured = np.array(numbers, dtype=np.float64).reshape(-1, 4)
-    warn_of_units(f"inventory {path.name}", np.array(sound, dtype=np.int64), measured)
+    _warn_of_units(f"inventory {path.name}", np.array(sound, dtype=np.int64), measured)
     return Inventory(measured[:, :2], measured[:, 2], measured[:, 3], tuple(names))
 
 
@@ -141,3 +150,39 @@ def _wrong(column: str, value: float) -> str:
         return "must be above 0; an empty field means not measured"
     highest = _THICKEST_CM if column == "dbh_cm" else _TALLEST_M
     return f"is above {highest:g}" if value > highest else ""
+
+
+def _warn_of_units(where: str, rows: NDArray[np.int64], table: NDArray[np.float64]) -> None:
+    """Logs one warning for each doubtful column, once for each file.
+
+    where: names the inventory. rows: (N,) of the file. table: (N, 4) x, y, diameter and height in
+    m, NaN where not measured.
+    """
+    x, y, dbh, height = table.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        thin = (100.0 * dbh < _THINNEST_USUAL_CM) | (height / dbh > _SLENDEREST)
+        thick = 100.0 * dbh > _THICKEST_USUAL_CM
+    for doubtful, unit in ((thin, "m"), (thick, "mm")):
+        if doubtful.any():
+            first = int(np.argmax(doubtful))
+            _warn(
+                f"{where}: row {rows[first]}: dbh_cm is {100.0 * dbh[first]:.4g}"
+                + (f", with a height of {height[first]:g} m" if height[first] > 0.0 else "")
+                + f"; is it in {unit}? ({counted(int(doubtful.sum()), 'tree')} of {len(rows)})"
+            )
+    _, first_of = np.unique(table, axis=0, return_index=True, equal_nan=True)
+    repeated = np.setdiff1d(np.arange(len(x)), first_of)
+    if len(repeated):
+        _warn(
+            f"{where}: row {rows[repeated[0]]} repeats a row above it; does the file hold trees "
+            f"twice? ({counted(len(repeated), 'tree')} of {len(rows)})"
+        )
+    in_degrees = len(first_of) > 1 and np.abs(x).max() <= 180.0 and np.abs(y).max() <= 90.0
+    if in_degrees and max(np.ptp(x), np.ptp(y)) < _TOGETHER_M:
+        _warn(f"{where}: all {len(rows)} trees are within 1 m; are x_m and y_m in degrees?")
+
+
+@lru_cache(maxsize=100)
+def _warn(text: str) -> None:
+    """Logs a warning once, however often the same file is read."""
+    _log.warning("%s", text)

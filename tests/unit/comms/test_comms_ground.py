@@ -33,8 +33,7 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import StationFrame, StationFrameKind
-from volery.comms.station.address_parsing import address_of
-from volery.comms.station.ground_station import GroundStation
+from volery.comms.station.ground_station import GroundStation, address_of
 from volery.comms.station.station_bridge import StationBridge
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError

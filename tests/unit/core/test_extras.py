@@ -144,7 +144,7 @@ def intervals():
 
 
 def hypercubes():
-    from volery.cluster.sampling import draw
+    from volery.cluster.points import draw
     from volery.cluster.study import StudySampling
 
     draw([], StudySampling(method="latin_hypercube", samples=2))

@@ -1,23 +1,33 @@
-"""Finds rospy: in the running environment, in a sourced ROS, or where Debian installs it."""
+"""Finds rospy: in the running environment, in a sourced ROS, or where Debian installs it.
+
+It works without `netifaces`: the addresses of this machine are read here.
+"""
 
 from __future__ import annotations
 
+import fcntl
 import importlib
 import importlib.util
 import logging
 import os
+import socket
+import struct
 import sys
 import threading
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.ros1.local_addresses import provide_local_addresses
 from volery.core.errors import BridgeError
 from volery.graph.nodes.imports import forget_message_packages, withdraw_ros_imports
 
 _DEBIAN = Path("/usr/lib/python3/dist-packages")
 _PACKAGES = "python3-rospy python3-rosmaster ros-std-msgs"
+_SIOCGIFADDR = 0x8915
+_NAME_BYTES = 16
+_REQUEST_BYTES = 40
+"""`struct ifreq` of linux/if.h: a name, then the address in a `sockaddr_in`."""
+_ADDRESS = slice(20, 24)
 _lock = threading.Lock()
 
 
@@ -48,7 +58,7 @@ def _load() -> Any:
     logger_class, before = logging.getLoggerClass(), set(sys.modules)
     try:
         rospy = importlib.import_module("rospy")
-        provide_local_addresses()
+        _provide_local_addresses()
     except ImportError as error:
         raise BridgeError(
             f"ROS 1 needs rospy, which cannot be loaded ({error}); on Debian: "
@@ -72,3 +82,32 @@ def _folders() -> list[str]:
         if (folder / "rospy" / "__init__.py").is_file():
             return list(dict.fromkeys((str(folder), str(_DEBIAN))))
     return []
+
+
+def _provide_local_addresses() -> None:
+    """Makes rosgraph work if `netifaces` cannot be imported; call it after rospy is loaded.
+
+    Debian's `python3-rosgraph` imports that package when a node with `ROS_HOSTNAME=localhost`
+    connects to another one, but neither depends on it nor works without it; a build for Debian's
+    Python does not work with another version. An importable `netifaces` stays loaded, even if its
+    folder leaves `sys.path` later.
+    """
+    try:
+        importlib.import_module("netifaces")
+    except ImportError:
+        network: Any = importlib.import_module("rosgraph.network")
+        network.get_local_addresses = _ipv4_addresses
+
+
+def _ipv4_addresses() -> list[str]:
+    """Returns the first IPv4 address of each network interface that has one."""
+    found = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            request = struct.pack(f"{_REQUEST_BYTES}s", name.encode()[: _NAME_BYTES - 1])
+            try:
+                answer = fcntl.ioctl(probe.fileno(), _SIOCGIFADDR, request)
+            except OSError:  # no address
+                continue
+            found.append(socket.inet_ntoa(answer[_ADDRESS]))
+    return found

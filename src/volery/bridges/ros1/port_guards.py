@@ -2,7 +2,7 @@
 
 rospy waits for headers without end in the thread that accepts connections, reads bodies of any
 size, has a thread for each XML-RPC connection, and ends its server when file descriptors run out.
-Subclasses replace its classes before a node starts.
+Subclasses replace its classes before a node starts. They also refuse requests of web pages.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from __future__ import annotations
 import importlib
 import socket
 import socketserver
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
 from volery.bridges.ros1.connection_headers import HeaderServer
-from volery.bridges.ros1.web_pages import is_of_a_page
 from volery.core.listener import open_listener
 
 MAX_CALL_BYTES = 256 << 10
@@ -108,6 +108,20 @@ def _refusal(headers: Any) -> tuple[HTTPStatus, str] | None:
     if headers.get("Content-Encoding", "identity") != "identity":
         return HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "compressed bodies are not supported"
     return None
+
+
+def is_of_a_page(headers: Mapping[str, str]) -> bool:
+    """Returns whether a web page may have sent a request with these headers.
+
+    A page of any site may post to any port of its user's machine, as long as the content type is
+    one of those of forms. XML-RPC demands `text/xml`. Browsers name the page's origin in each POST;
+    programs name none.
+
+    Sources: Fetch Standard, "CORS-safelisted request-header"; XML-RPC Specification, "Header
+    requirements"; RFC 6454 section 7.
+    """
+    kind = (headers.get("Content-Type") or "").partition(";")[0].strip().lower()
+    return "Origin" in headers or not kind.endswith("/xml")
 
 
 def _call_server(base: Any) -> Any:

@@ -20,6 +20,7 @@ from volery.comms.addresses import GROUP_SIZE, SERVER, Identity
 from volery.comms.control_payloads import (
     Hello,
     Reason,
+    Received,
     Refusal,
     decode_refusal,
     decode_settled,
@@ -34,7 +35,6 @@ from volery.comms.protocol import (
     StationFrameParser,
     encode_frame,
 )
-from volery.comms.station.receive_log import ReceiveLog
 from volery.comms.station.send_buffer import SendBuffer
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
@@ -48,6 +48,8 @@ _ACKNOWLEDGE_AT_ONCE = 64
 _REFUSALS_KEPT = 256
 _MAX_RECEIVED = 1000
 """Max entries of one RECEIVED, below the limit of payloads."""
+_SESSIONS_KEPT = 8
+"""Number of sessions for each source: after a restart its older messages may still arrive."""
 
 
 class StationCore:
@@ -71,7 +73,7 @@ class StationCore:
         self._hello = encode_hello(hello)
         self._parser = StationFrameParser()
         self._held = SendBuffer()
-        self._inbox = ReceiveLog()
+        self._inbox = _ReceiveLog()
         self._out: list[bytes] = []
         self._sequence = 0
         self._spoke_ns = 0
@@ -233,3 +235,44 @@ class StationCore:
             encode_frame(kind, self.address, SERVER, self._session, 0, now_ns, payload)
         )
         self._spoke_ns = now_ns
+
+
+class _ReceiveLog:
+    """Stores the last sequence of each source in each of its latest sessions.
+
+    It detects repeated messages, and collects acknowledgements.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[int, dict[int, int]] = {}
+        self._logged: dict[tuple[int, int], int] = {}
+        self._unacknowledged = 0
+        self.duplicates = 0
+        """Number of repeated messages."""
+
+    def __len__(self) -> int:
+        """Returns the number of messages since the last `take`."""
+        return self._unacknowledged
+
+    def is_new(self, frame: StationFrame) -> bool:
+        """Returns whether a message is new; it is acknowledged in either case."""
+        sessions = self._last.setdefault(frame.source, {})
+        last = sessions.get(frame.session, 0)
+        newest = max(last, frame.sequence)
+        sessions[frame.session] = newest
+        if len(sessions) > _SESSIONS_KEPT:
+            del sessions[next(iter(sessions))]
+        self._logged[frame.source, frame.session] = frame.sequence
+        self._unacknowledged += 1
+        new = frame.sequence > last
+        self.duplicates += not new
+        return new
+
+    def take(self) -> list[Received]:
+        """Returns the pending acknowledgements and clears them."""
+        received = [
+            Received(source, session, last) for (source, session), last in self._logged.items()
+        ]
+        self._logged.clear()
+        self._unacknowledged = 0
+        return received

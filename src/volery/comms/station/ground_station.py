@@ -1,12 +1,16 @@
-"""A ground station without terminal and sockets: command lines in, messages and text out."""
+"""A ground station without terminal and sockets: command lines in, messages and text out.
+
+It parses addresses as users write them, and tells how old a state is although clocks differ.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from volery.comms.addresses import GROUP_SIZE, Identity, is_meant, is_station
+from volery.comms.addresses import ALL, GROUP_SIZE, Identity, batch_address, is_meant, is_station
 from volery.comms.control_payloads import Refusal
 from volery.comms.payloads import (
     COMMANDS,
@@ -22,8 +26,6 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import StationFrame, StationFrameKind
-from volery.comms.station.address_parsing import address_of
-from volery.comms.station.clock_offset import ClockOffset
 from volery.comms.station.statuses import mission_gist, slam_gist
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
@@ -50,6 +52,16 @@ _USAGE = {
 _SIMPLE = {"land": "land", "hold": "hold", "return": "return_home", "resume": "resume"}
 _TYPED = {"return_home": "return", "take_off_to": "take_off"}
 """Words of the command line for commands of another name."""
+_FORMS = "a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all"
+
+_MIN_GAP_RATIO = 0.5
+"""Min ratio of the gaps at both ends; a smaller one is a backlog that arrives at once, or its
+beginning.
+"""
+_LONGEST_KEPT_NS = 65 * NS_PER_S
+"""Slightly longer than a server stores messages; an older one means that the clocks differ.
+Modelling choices.
+"""
 
 
 class StationRow(NamedTuple):
@@ -99,7 +111,7 @@ class GroundStation:
         self._is_joined = is_joined
         self._planes = group_size
         self._states: dict[int, tuple[Any, int]] = {}
-        self._fresh: dict[int, ClockOffset] = {}
+        self._fresh: dict[int, _ClockOffset] = {}
         self._missions: dict[int, Any] = {}
         self._slams: dict[int, str] = {}
         self._asked: dict[int, str] = {}
@@ -115,7 +127,7 @@ class GroundStation:
             return f"{self._name(frame.source)}: {error}"
         if named[:2] == (STATE, STATE_TYPE):
             before = self._states.get(frame.source)
-            fresh = self._fresh.setdefault(frame.source, ClockOffset())
+            fresh = self._fresh.setdefault(frame.source, _ClockOffset())
             made_ns = fresh.made_ns(frame.time_ns, now_ns)
             self._states[frame.source] = named.message, made_ns
             mode = named.message.mode
@@ -226,6 +238,53 @@ class GroundStation:
             self._slams.get(address, "-"),
             "" if mission is None else mission.problem,
         )
+
+
+class _ClockOffset:
+    """Clock offset of one source: gives the send time of a message by the receiver's clock.
+
+    A frame holds its send time by its source's clock. The two clocks may differ, and messages that
+    a server has stored arrive late, all at once. So a message counts as new if the gap to the
+    previous one is about the same at both ends. A new message gives the offset of the clocks, which
+    then gives the age of late ones. Before, both clocks are assumed to agree.
+    """
+
+    def __init__(self) -> None:
+        self._before: tuple[int, int] | None = None
+        """Send time of the latest message, by its source's clock, and its arrival."""
+        self._offset_ns: int | None = None
+        """Own clock minus the source's; None: unknown."""
+
+    def made_ns(self, sent_ns: int, now_ns: int) -> int:
+        """Returns the send time of a message that arrives now, by the own clock, at most now."""
+        if self._before is not None:
+            sent_gap_ns, gap_ns = sent_ns - self._before[0], now_ns - self._before[1]
+            if 0 < _MIN_GAP_RATIO * sent_gap_ns <= gap_ns <= sent_gap_ns / _MIN_GAP_RATIO:
+                self._offset_ns = now_ns - sent_ns
+        self._before = sent_ns, now_ns
+        if self._offset_ns is not None:
+            return min(sent_ns + self._offset_ns, now_ns)
+        return sent_ns if 0 <= now_ns - sent_ns <= _LONGEST_KEPT_NS else now_ns
+
+
+def address_of(text: str, group_size: int, names: Mapping[str, int]) -> int:
+    """Returns the address of a word; names: addresses by the names that stations report.
+
+    `uavN`, if no station reports it, is the station with linear id N - 1. Raises CommsError if the
+    word is no address.
+    """
+    if text == "all":
+        return ALL
+    if text in names:
+        return names[text]
+    if found := re.fullmatch(r"batch(\d{1,5})", text):
+        return batch_address(int(found[1]))
+    if found := re.fullmatch(r"(\d{1,5})\.(\d{1,5})", text):
+        return Identity(int(found[1]), int(found[2])).address(group_size)
+    if found := re.fullmatch(r"(uav)?(\d{1,5})", text):
+        linear = int(found[2]) - bool(found[1])
+        return Identity.of(linear, group_size).address(group_size)
+    raise CommsError(f"'{text}' is not an address: write {_FORMS}")
 
 
 def _position_of(words: list[str]) -> dict[str, Any]:

@@ -1,14 +1,16 @@
-"""Trains and evaluates policies in one call."""
+"""Trains and evaluates policies in one call, after a check that policy and task fit."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from volery.autonomy.policy.description import PolicyDescription
 from volery.autonomy.policy.policy_file import Policy
 from volery.autonomy.policy.shipped_policies import load_policy
+from volery.core.errors import VoleryError
+from volery.learning.policy_description import describe
 from volery.learning.task import Task
-from volery.learning.training.compatibility import check_policy
 from volery.learning.training.configuration import TrainingConfiguration, load_configuration
 from volery.learning.training.evaluation import Evaluation, evaluate_actions
 from volery.learning.training.task_loading import find_task
@@ -61,7 +63,35 @@ def evaluate(
     """
     own = policy if isinstance(policy, Policy) else load_policy(str(policy))
     found = find_task(own.description.task if task is None else task)
-    check_policy(own.description, found)
+    _check_policy(own.description, found)
     return evaluate_actions(
         found, own.act, episodes, seed=seed, threads=threads, on_decision=on_decision
     )
+
+
+def _check_policy(description: PolicyDescription, task: Task) -> None:
+    """Raises `VoleryError` if observations, actions or decision rate differ from the task's."""
+    wrong = f"the policy is of task '{description.task}' and does not fit task '{task.name}'"
+    its = [(part.name, part.numbers) for part in description.observation]
+    own = [(part.name, part.numbers) for part in describe(task).observation]
+    if its != own:
+        raise VoleryError(f"{wrong}: it observes {_parts(its)}; the task has {_parts(own)}")
+    action = description.action
+    if (action.size, action.choices) != (task.action.size, task.action.choices):
+        raise VoleryError(
+            f"{wrong}: its actions have {_action(action.size, action.choices)}; "
+            f"those of the task {_action(task.action.size, task.action.choices)}"
+        )
+    if description.decision_rate_hz != task.decision_rate_hz:
+        raise VoleryError(
+            f"{wrong}: it decides at {description.decision_rate_hz:g} Hz, the task at "
+            f"{task.decision_rate_hz:g} Hz"
+        )
+
+
+def _parts(parts: list[tuple[str, int]]) -> str:
+    return ", ".join(f"{name} ({size})" for name, size in parts)
+
+
+def _action(size: int, choices: int | None) -> str:
+    return f"{size} numbers" if choices is None else f"{choices} choices"

@@ -4,19 +4,28 @@
 
 It reads untrusted files with bounds on memory and time, apart from a running simulation. It prints
 one JSON object: `{}` or `{"error": "one clear message"}`.
+
+A whole scenario is a TOML file, which keeps its text under the name that the server gives it.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sys
+import tomllib
 from pathlib import Path
 
-from volery.core.errors import VoleryError
+from volery.core.errors import ScenarioError, VoleryError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.scenario.catalog import ScenarioCatalog
+from volery.scenario.schema import Scenario
 from volery.server.bounded_process import bound_this_process
-from volery.server.uploads.kinds import BOUNDS, SCENARIO
+from volery.server.uploads.kinds import BOUNDS, MAX_UAVS, SCENARIO
 from volery.server.uploads.scenario_builder import toml_of
+
+_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
+_NAME = re.compile(r"""^[ \t]*(?:name|"name"|'name')[ \t]*=.*$""", re.MULTILINE)
 
 
 def check(kind: str, path: Path, name: str, called: str) -> None:
@@ -32,7 +41,6 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
         build_terrain,
     )
     from volery.scenario.load import load_scenario
-    from volery.server.uploads.scenario_file import check_contents, text_of
 
     target = path.parent / ScenarioCatalog.FILE
     own = kind == SCENARIO
@@ -40,7 +48,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
     target.write_text(text, encoding="utf-8")
     scenario = load_scenario(target, confined=True)
     if own:
-        check_contents(scenario)
+        _check_contents(scenario)
         check_types(scenario)
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
@@ -50,6 +58,43 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
         place_fleet(scenario, scene, terrain)
     finally:
         scene.close()
+
+
+def text_of(path: Path, name: str) -> str:
+    """Returns the TOML of a scenario under another name: uploads are identified by their folders.
+
+    Raises ScenarioError for a file that is not TOML, or has no line `name = "..."` at its top.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        before = parse_toml(text)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"{path}: not valid TOML: {reason_of(error)}") from None
+    table = _TABLE.search(text)
+    top = len(text) if table is None else table.start()
+    renamed = _NAME.sub(f'name = "{name}"', text[:top], count=1) + text[top:]
+    try:
+        is_renamed = parse_toml(renamed) == {**before, "name": name}
+    except tomllib.TOMLDecodeError:
+        is_renamed = False
+    if not is_renamed:
+        raise ScenarioError(f'{path}: give the name on a line of its own at the top: name = "..."')
+    return renamed
+
+
+def _check_contents(scenario: Scenario) -> None:
+    """Checks an untrusted scenario's demands on the server, except for its world.
+
+    Raises ScenarioError for too many UAVs, and for a node that Volery does not ship.
+    """
+    from volery.runtime.construction.node_loading import find_node
+
+    if scenario.uav_count > MAX_UAVS:
+        raise ScenarioError(
+            f"{scenario.name}: {scenario.uav_count} UAVs; at most {MAX_UAVS} are allowed"
+        )
+    for entry in scenario.node_entries:
+        find_node(entry, scenario.name, scenario.access)
 
 
 def main(kind: str, file: str, name: str, called: str) -> None:

@@ -1,8 +1,8 @@
 """The air of a world: wind, gusts, turbulence and particles, as data and as compiled parts.
 
 `Weather` (`model`) is the data, `table` converts it for kernels, and `air` computes the velocity
-at a UAV: mean wind (`mean_wind`) + gusts (`gusts`) + turbulence (`dryden`). `particles` has rain,
-snow, fog and dust, and the visibility in them; `sun` the sun's angles by the hour.
+at a UAV: mean wind (`mean_wind`) + gusts + turbulence (`dryden`). `particles` has rain, snow, fog
+and dust, and the visibility in them; `sun` the sun's angles by the hour.
 """
 
 from volery.world.weather.dryden import W20_M_S

@@ -1,14 +1,15 @@
-"""Runs the active flight mode at each state of the UAV."""
+"""Runs the active flight mode at each state of the UAV; take-off, hold and landing are here."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import (
     follow_target,
-    landing,
     manual_control,
     mission_flight,
     mode_transitions,
@@ -24,6 +25,8 @@ from volery.mavlink.autopilot.vehicle import FlightState
 
 _ASIDE_M = 1.0
 """Distance from which a take-off ends at a position of its own (modelling choice)."""
+_DESCENT_STEP_M_S = 0.02
+"""Smallest change of a landing's speed that is sent as a command."""
 
 
 def fly(context: AutopilotContext, state: FlightState) -> None:
@@ -33,7 +36,7 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
         return
     _FLIGHTS[memory.mode](context, state)
     if memory.order == "land" and state.mode == "LAND":
-        landing.follow(context, state)
+        _set_descent_speed(context, state)
 
 
 def _take_off(context: AutopilotContext, state: FlightState) -> None:
@@ -69,6 +72,32 @@ def _land(context: AutopilotContext, state: FlightState) -> None:
     if context.memory.target is None:
         x, y, _ = state.position
         context.memory.target = OffboardSetpoint(position=(x, y, math.nan))
+
+
+def _set_descent_speed(context: AutopilotContext, state: FlightState) -> None:
+    """Sets the current landing's descent speed by its height."""
+    memory = context.memory
+    ground = memory.home_or_origin[2]
+    speed = _descent_speed_at(context, state.position[2] - ground)
+    if not abs(speed - memory.sinks) < _DESCENT_STEP_M_S:
+        memory.sinks = speed
+        context.vehicle.sink(speed)
+
+
+def _descent_speed_at(context: AutopilotContext, height_m: float) -> float:
+    """Returns the descent speed, m/s, at a height: fast high up, slow near the ground.
+
+    Follows PX4's FlightTaskAuto: MPC_Z_VEL_MAX_DN above MPC_LAND_ALT1, MPC_LAND_SPEED below
+    MPC_LAND_ALT2, interpolated by height in between, and MPC_Z_V_AUTO_DN at most. The height is
+    that above home, as in a PX4 without a distance sensor.
+    """
+    slow, fast, max_speed = (
+        float(context.parameter(name))
+        for name in ("MPC_LAND_SPEED", "MPC_Z_VEL_MAX_DN", "MPC_Z_V_AUTO_DN")
+    )
+    low = float(context.parameter("MPC_LAND_ALT2"))
+    high = max(float(context.parameter("MPC_LAND_ALT1")), low)
+    return min(float(np.interp(height_m, (low, high), (slow, fast))), max_speed)
 
 
 _FLIGHTS: dict[Mode, Callable[[AutopilotContext, FlightState], None]] = {

@@ -1,8 +1,9 @@
-"""Maps received messages to their handlers."""
+"""Maps received messages to their handlers; those of logs, files and simple messages are here."""
 
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -10,8 +11,6 @@ from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import follow_target, manual_control, offboard
 from volery.mavlink.autopilot.protocols import (
     commands,
-    file_protocol,
-    log_protocol,
     mission_protocol,
     parameter_protocol,
     shell,
@@ -24,6 +23,20 @@ _GROUND_STATION = 6
 """Value MAV_TYPE_GCS."""
 _UNSET, _UNSET_AS_FLOAT, _NAN_AS_INTEGER = 2**31 - 1, 2.0**31, 0x7FF80000
 """INT32_MAX, also as a float, and the bits of a nan that PX4 recognizes in an integer."""
+
+_FILE_HEADER = struct.Struct("<HBBBBBBI")
+"""Sequence, session, opcode, size, answered opcode, end of a burst, padding, offset."""
+_FILE_PAYLOAD = 251
+_FILE_BYTES = _FILE_PAYLOAD - _FILE_HEADER.size
+_ACK, _NAK = 128, 129
+_FAIL, _INVALID_SIZE, _INVALID_SESSION, _UNKNOWN_COMMAND, _NOT_FOUND = 1, 3, 4, 7, 10
+_FILE_FAULTS = {
+    **dict.fromkeys((0, 2), 0),  # none, and terminate all sessions
+    **dict.fromkeys((1, 5, 7, 15), _INVALID_SESSION),  # terminate, read, write, burst
+    **dict.fromkeys((3, 4, 8, 10, 12, 13, 14, 16), _NOT_FOUND),  # operations on a path
+    **dict.fromkeys((6, 9, 11), _FAIL),  # operations that create something
+}
+"""Error by opcode of FTP; 0: none."""
 
 
 def _heartbeat(context: AutopilotContext, _source: Source, message: Any) -> None:
@@ -80,6 +93,45 @@ def _data_stream(context: AutopilotContext, source: Source, message: Any) -> Non
     """Ignores the old REQUEST_DATA_STREAM, which MAVProxy sends at its start, as PX4 does."""
 
 
+def _answer_file_request(context: AutopilotContext, source: Source, message: Any) -> None:
+    """Answers MAVLink FTP like a server without files, so that clients do not wait for a timeout.
+
+    Header and answers follow `mavlink_ftp.cpp` of PX4 1.18.
+    """
+    payload = bytes(message.payload)
+    sequence, session, opcode, size, _, _, _, offset = _FILE_HEADER.unpack_from(payload)
+    fault = _INVALID_SIZE if size > _FILE_BYTES else _FILE_FAULTS.get(opcode, _UNKNOWN_COMMAND)
+    kind, data = (_NAK, bytes((fault,))) if fault else (_ACK, b"")
+    head = _FILE_HEADER.pack(sequence + 1 & 0xFFFF, session, kind, len(data), opcode, 0, 0, offset)
+    link, system, component = source
+    message_class = dialect().MAVLink_file_transfer_protocol_message
+    context.links.send(
+        message_class(0, system, component, (head + data).ljust(_FILE_PAYLOAD, b"\0")), link
+    )
+
+
+def _list_logs(context: AutopilotContext, source: Source, message: Any) -> None:
+    """Handles LOG_REQUEST_LIST."""
+    context.log.transfers.list_logs(source[0], message.start, message.end)
+
+
+def _send_log_data(context: AutopilotContext, source: Source, message: Any) -> None:
+    """Handles LOG_REQUEST_DATA; nothing is sent for a missing log, as in PX4."""
+    parts = int(message.id), int(message.ofs), int(message.count)
+    context.log.transfers.send_data(source[0], *parts)
+
+
+def _erase_logs(context: AutopilotContext, _source: Source, _message: Any) -> None:
+    """Handles LOG_ERASE: deletes all logs except for that of the current flight."""
+    context.log.transfers.clear()
+    context.log.storage.erase(keeps_newest=context.log.is_recording)
+
+
+def _end_log_requests(context: AutopilotContext, source: Source, _message: Any) -> None:
+    """Handles LOG_REQUEST_END."""
+    context.log.transfers.forget(source[0])
+
+
 def _refuse(context: AutopilotContext, _source: Source, message: Any) -> None:
     """Says once that a message which PX4 obeys is not."""
     kind = message.get_type()
@@ -123,11 +175,11 @@ HANDLERS: dict[str, Callable[[AutopilotContext, Source, Any], None]] = {
     "MISSION_ACK": mission_protocol.take_ack,
     "MISSION_CLEAR_ALL": mission_protocol.clear,
     "MISSION_SET_CURRENT": mission_protocol.set_current,
-    "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
-    "LOG_REQUEST_LIST": log_protocol.list_logs,
-    "LOG_REQUEST_DATA": log_protocol.send_data,
-    "LOG_REQUEST_END": log_protocol.end,
-    "LOG_ERASE": log_protocol.erase,
+    "FILE_TRANSFER_PROTOCOL": _answer_file_request,
+    "LOG_REQUEST_LIST": _list_logs,
+    "LOG_REQUEST_DATA": _send_log_data,
+    "LOG_REQUEST_END": _end_log_requests,
+    "LOG_ERASE": _erase_logs,
     "SERIAL_CONTROL": shell.take,
     **dict.fromkeys(_REFUSED, _refuse),
 }

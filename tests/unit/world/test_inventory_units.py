@@ -4,7 +4,7 @@ import logging
 
 import pytest
 
-from volery.world import inventory_checks
+from volery.world import inventory
 from volery.world.inventory import read_inventory
 
 
@@ -13,7 +13,7 @@ def doubts(tmp_path, caplog):
     """Read rows below the columns x_m,y_m,dbh_cm,height_m; returns the warnings."""
 
     def read(*rows):
-        inventory_checks._warn.cache_clear()
+        inventory._warn.cache_clear()
         path = tmp_path / "trees.csv"
         path.write_text("\n".join(["x_m,y_m,dbh_cm,height_m", *rows]))
         with caplog.at_level(logging.WARNING):
