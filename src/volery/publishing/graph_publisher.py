@@ -406,4 +406,6 @@ def _diagonal(variance: float) -> Array:
 
 
 def _matrix(diagonal: Array) -> Array:
-    return read_only(np.diag(diagonal).reshape(36))
+    matrix = np.zeros(36)
+    matrix[::7] = diagonal
+    return read_only(matrix)

@@ -1,6 +1,6 @@
 """Cross 60 m of a dense forest at 3 m/s or faster, by a planar LIDAR: OpenUAV's third task.
 
-Each episode takes place in one of 64 stands of longleaf pine with 500 trees per hectare: 400 on
+Each episode takes place in one of 256 stands of longleaf pine with 500 trees per hectare: 400 on
 60 m by 133 m. Their trunks are 2 to 80 cm thick; few have branches at the height of the flight.
 """
 
@@ -30,7 +30,7 @@ _HALF_WIDTH_M = 66.6
 _SIDE_M = 45.0
 """Largest distance of a start from the middle."""
 _TURN_RAD = math.radians(10.0)
-TRAINING_WORLDS = tuple(range(1000, 1064))
+TRAINING_WORLDS = tuple(range(1000, 1256))
 UNSEEN_WORLDS = tuple(range(5000, 5200))
 _SECTORS = lidar_sectors(
     sectors=36, angle_min_rad=-0.75 * math.pi, angle_max_rad=0.75 * math.pi, max_range_m=10.0
@@ -43,7 +43,7 @@ def forest() -> Task:
         "forest",
         "Cross 60 m of a dense forest at 3 m/s or faster, by a planar LIDAR",
         scenario=forest_scenario,
-        action=LevelVelocity(forward_m_s=3.6, lateral_m_s=2.5, keep_height_m=HEIGHT_M),
+        action=LevelVelocity(forward_m_s=3.4, lateral_m_s=2.5, keep_height_m=HEIGHT_M),
         observations=(
             _SECTORS,
             observations.velocity_heading(SPEED_M_S, noise=0.05),
@@ -51,7 +51,7 @@ def forest() -> Task:
             observations.last_action(2),
         ),
         rewards=(
-            lines.progress(0.3, 1.1 * SPEED_M_S),
+            lines.progress(0.3, 1.07 * SPEED_M_S),
             lines.too_slow(-0.03, SPEED_M_S),
             lines.clearance(-0.5, _SECTORS, near=0.87),
             rewards.action_change(-0.05),
