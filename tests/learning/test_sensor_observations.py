@@ -141,7 +141,7 @@ def test_samples_are_as_old_as_their_sensors_say():
 
 def test_a_forest_has_its_own_pool_of_worlds():
     task = load_task("forest")
-    assert len(task.worlds) == 64
+    assert len(task.worlds) == 256
     assert len(task.unseen_worlds) == 200
     assert not set(task.worlds) & set(task.unseen_worlds)
 

@@ -69,7 +69,8 @@ class FleetCommands:
 
     def mode(self, i: int) -> FlightMode:
         """Returns the flight mode of UAV `i`."""
-        return _MODES[self._modes[i]]
+        mode: FlightMode = _MODES[self._modes[i]]
+        return mode
 
     def is_braking(self, i: int) -> bool:
         """Returns whether UAV `i` still brakes before it holds its position."""

@@ -63,7 +63,7 @@ def make_batch(
     uavs = np.atleast_1d(np.asarray(uav, dtype=np.int64))
 
     def column(values: ArrayLike, kind: type) -> NDArray[Any]:
-        filled = np.empty(uavs.shape, kind)
+        filled: NDArray[Any] = np.empty(uavs.shape, kind)
         filled[...] = values
         return filled
 
