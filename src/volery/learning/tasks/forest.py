@@ -43,7 +43,7 @@ def forest() -> Task:
         "forest",
         "Cross 60 m of a dense forest at 3 m/s or faster, by a planar LIDAR",
         scenario=forest_scenario,
-        action=LevelVelocity(forward_m_s=3.4, lateral_m_s=2.5, keep_height_m=HEIGHT_M),
+        action=LevelVelocity(forward_m_s=3.25, lateral_m_s=2.5, keep_height_m=HEIGHT_M),
         observations=(
             _SECTORS,
             observations.velocity_heading(SPEED_M_S, noise=0.05),
@@ -51,12 +51,12 @@ def forest() -> Task:
             observations.last_action(2),
         ),
         rewards=(
-            lines.progress(0.3, 1.07 * SPEED_M_S),
+            lines.progress(0.3, 1.04 * SPEED_M_S),
             lines.too_slow(-0.03, SPEED_M_S),
             lines.clearance(-0.5, _SECTORS, near=0.87),
             rewards.action_change(-0.05),
         ),
-        terminations=(lines.crossed(LENGTH_M, 3.0), terminations.crashed(-15.0)),
+        terminations=(lines.crossed(LENGTH_M, 3.0), terminations.crashed(-20.0)),
         begin=_begin,
         decision_rate_hz=10.0,
         episode_s=LENGTH_M / SPEED_M_S,
