@@ -13,7 +13,6 @@ from volery.cli.error_reporting import USER_ERROR, warn
 from volery.cli.terminal import echo_line
 from volery.core.errors import DivisionError, VoleryError
 from volery.core.machine import usable_cores
-from volery.core.network_access import check_address, check_token
 
 if TYPE_CHECKING:
     from volery.cli.flight import RunOptions
@@ -45,6 +44,8 @@ def workers_of(
 
     listen = None
     if options.listen is not None:
+        from volery.core.network_access import check_address, check_token
+
         listen = parse_address("--listen", options.listen)
         check_address(listen[0], anywhere=options.allow_remote, flag="--allow-remote")
         if not options.token:

@@ -12,8 +12,8 @@ requested speed and ends where the recorded one did.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from volery.bridges.logs.recorded_flight import RecordedCommand, RecordedFlight
 from volery.core.errors import CommandError
 from volery.engine.command_queue import CommandTime
 from volery.engine.engine import Engine
@@ -21,6 +21,9 @@ from volery.engine.pacing import Pacer
 from volery.graph.session import Gateway
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.replay.command_repeater import CommandRepeater
+
+if TYPE_CHECKING:
+    from volery.bridges.logs.recorded_flight import RecordedCommand, RecordedFlight
 
 
 class CommandReplay:
