@@ -187,7 +187,10 @@ def test_a_message_that_is_too_large_ends_the_connection(server):
 
 
 def test_a_client_that_stops_reading_loses_its_own_messages_only():
-    """120 images of 1 MB: a client that reads gets all, another one a handful."""
+    """Images of 1 MB: a client that reads receives all; the queue of another one drops them.
+
+    How many fit into the buffers of the system and of the client's library depends on the load.
+    """
     world = LiveGraph()
     image = zero_message("sensor_msgs/msg/Image")
     image.data = np.zeros(1_000_000, np.uint8)
@@ -202,26 +205,21 @@ def test_a_client_that_stops_reading_loses_its_own_messages_only():
             reader.send("subscribe", queue_length=200, **wanted)
             eventually(lambda: len(boxes(world)) == 2)
             publisher = world.graph.advertise("/image", "sensor_msgs/msg/Image")
-            for number in range(120):
+            for _ in range(400):
                 world.do(lambda: publisher.publish(image))
                 assert len(reader.socket.recv(60.0)) > 1_000_000
-                if number == 60:  # by now the buffers of both ends are full
-                    before = min(kept(box) for box in boxes(world))
-            served, stalled = sorted(boxes(world), key=lambda box: box.dropped)
-            assert served.dropped == 0
+                served, stalled = sorted(boxes(world), key=lambda box: box.dropped)
+                assert served.dropped == 0
+                assert stalled.waiting <= 2
+                if stalled.dropped > 40:
+                    break
             assert stalled.dropped > 40
-            assert kept(stalled) < before + 15  # the system's buffers may still grow
     finally:
         world.close()
 
 
 def boxes(world):
     return [box for session in world.gateway.sessions() for box in session.queues]
-
-
-def kept(queue):
-    """The messages that a queue has not dropped: they wait, were sent, or lie in buffers."""
-    return queue.received - queue.dropped
 
 
 def test_a_world_is_left_though_a_client_reads_no_more():
