@@ -196,6 +196,14 @@ def test_a_shortened_run_leaves_pending_what_may_still_come(hop):
     strict = CliRunner().invoke(app, [*words, "--fail-on", "expectation"])
     assert strict.exit_code == 1
     assert re.search(r"failed +arrives", strict.output)
+    assert "failed: arrives" in strict.stderr
+
+
+def test_a_run_fails_by_an_expectation_that_cannot_be_judged(hop):
+    path = hop('[[expect]]\nkind = "speed"\nat_most_m_s = 9.0\nuavs = ["uav7"]\n')
+    done = CliRunner().invoke(app, ["run", str(path), "--fail-on", "expectation"])
+    assert done.exit_code == 1
+    assert "error: speed <= 9 m/s (uav7): " in done.stderr
 
 
 def test_whole_numbers_are_varied(hop, tmp_path):

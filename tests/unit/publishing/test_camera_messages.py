@@ -9,6 +9,7 @@ import pytest
 from volery.core.errors import ScenarioError
 from volery.publishing import image_codecs
 from volery.scenario.load import parse_scenario
+from volery.sensors.cameras.bank import CameraBank
 from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.cameras.model import CameraModel
 
@@ -53,6 +54,23 @@ def look(simulate):
         return [got[suffix] for suffix in suffixes]
 
     return listen
+
+
+def test_a_camera_without_receivers_renders_nothing(simulate, monkeypatch):
+    rendered = []
+    sample = CameraBank.sample
+
+    def noted(bank, k, time_ns, fleet):
+        rendered.append(k)
+        return sample(bank, k, time_ns, fleet)
+
+    monkeypatch.setattr(CameraBank, "sample", noted)
+    simulation = simulate(scenario())
+    simulation.run(0.3)
+    assert rendered == []
+    simulation.graph.subscribe("/uav1/camera/depth", lambda _message: None)
+    simulation.run(0.3)
+    assert rendered
 
 
 def test_raw_images_by_the_rules_of_cv_bridge(look):

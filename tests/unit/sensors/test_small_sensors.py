@@ -206,7 +206,19 @@ def test_odometry_drifts_with_distance_and_says_so():
     assert error[:, 1].std() == pytest.approx(across, rel=0.1)
     assert math.sqrt(reading.pose_variance[0, 1]) == pytest.approx(across, rel=1e-6)
     yaw_error = rotations.yaw_of(reading.attitude)
-    assert yaw_error.std() == pytest.approx(model.yaw_drift_rad_sqrt_m * 10.0, rel=0.1)
+    yaw_sigma = model.yaw_drift_rad_sqrt_m * math.sqrt(distance)
+    assert yaw_error.std() == pytest.approx(yaw_sigma, rel=0.1)
+    up = model.vertical_drift_m_sqrt_m**2 * distance
+    assert reading.pose_variance[0, 2:] == pytest.approx([up, 0.0, 0.0, yaw_sigma**2])
+    twist = [model.velocity_noise_m_s**2] * 3 + [model.rate_noise_rad_s**2] * 3
+    assert reading.twist_variance[0] == pytest.approx(twist)
+
+
+def test_odometry_messages_have_the_variances_on_the_diagonal(simulate, flat_data):
+    model = OdometryModel.load("visual_inertial")
+    twist = messages(simulate(flat_data), "/uav1/odom", 0.1)[-1].twist.covariance.reshape(6, 6)
+    known = [model.velocity_noise_m_s**2] * 3 + [model.rate_noise_rad_s**2] * 3
+    np.testing.assert_allclose(twist, np.diag(known))
 
 
 def test_standing_still_odometry_does_not_drift(simulate, flat_data):
