@@ -11,6 +11,7 @@ from volery.core.errors import CommandError, ScenarioError, SensorError
 from volery.runtime import Simulation, VectorizedSimulation
 from volery.runtime.environment_start import EnvironmentStart
 from volery.scenario.load import parse_scenario
+from volery.sensors.cameras.camera import take
 
 WORLDS = (11, 12, 13)
 STATES = ("position_map", "velocity_map", "attitude", "omega_body", "rotor_speed", "crashed")
@@ -209,6 +210,28 @@ def test_cameras_render_the_requested_parts_alone():
             camera.request_parts(["infrared"])
         with pytest.raises(SensorError, match="is no camera"):
             envs.sensors["uav1"]["imu"].request_parts(["depth"])
+
+
+def test_a_reset_renders_the_image_of_its_own_environment_alone(monkeypatch):
+    rendered = []
+    monkeypatch.setattr(
+        "volery.sensors.cameras.bank.take",
+        lambda scene, model, light, batch, *rest, **options: (
+            rendered.append(batch.uav.tolist())
+            or take(scene, model, light, batch, *rest, **options)
+        ),
+    )
+    with VectorizedSimulation(scenario(), 3, seeds=[5, 6, 7], threads=1) as envs:
+        envs.run(envs.common_period_s)
+        before = envs.sample("uav1", "camera")["colour"]
+        rendered.clear()
+        envs.reset([1], seeds=[8], start=START)
+        assert rendered == [[1]]
+        after = envs.sample("uav1", "camera")["colour"]
+        np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
+        assert (after[1] != before[1]).any()
+        envs.reset(seeds=[5, 8, 7], start=START)
+        np.testing.assert_array_equal(envs.sample("uav1", "camera")["colour"][1], after[1])
 
 
 def test_worlds_that_do_not_exist_are_refused(flown):

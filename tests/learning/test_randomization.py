@@ -115,10 +115,19 @@ def test_winds_are_those_of_a_scenario_with_other_weather(many):
     expected = alone(windy, command)
     before = many.get_state()
     parameters = EnvironmentParameters(wind_map=[5.0, -2.0, 0.0], turbulence_m_s=7.0)
+    many.reset(seeds=[7, 8, 9])
+    many.reset(seeds=[1, 1, 1])  # while the air is calm
     many.set_parameters(np.array([False, True, False]), parameters)
+    many.reset()
+    assert_equal(flown(many, command), expected)
+    many.reset(seeds=[4, 5, 6])
+    windy_state = many.get_state()
+    other = flown(many, command).position_map
     many.reset(seeds=[1, 1, 1])
     found = flown(many, command)
     assert_equal(found, expected)
+    many.set_state(windy_state)
+    np.testing.assert_array_equal(flown(many, command).position_map, other)
     assert np.linalg.norm(found.air_velocity_map[1]) > 3.0
     assert not found.air_velocity_map[0].any()
     many.set_state(before)

@@ -146,10 +146,8 @@ def test_a_tag_is_remembered_and_carried_on(episodes):
 
 def test_only_a_soft_touchdown_near_the_tag_succeeds(episodes):
     flight = episodes.flight
-    state = flight.state._replace(
-        on_ground=np.ones((K, 1), np.bool_), crashed=np.zeros((K, 1), np.bool_)
-    )
-    flight._state = state
+    flight._state = state = flight.envs.present_state()
+    state.on_ground, state.crashed = np.ones((K, 1), np.bool_), np.zeros((K, 1), np.bool_)
     kept = flight.values[landing.MOTION]
     kept[:] = 0.0
     kept[0, 0, 5] = -0.9

@@ -66,9 +66,30 @@ def test_a_yaw_alone_is_a_roll_and_pitch_of_zero_to_the_byte(yaw):
     assert rot.from_yaw(yaw[0]).tobytes() == rot.from_rpy(0.0, 0.0, yaw[0]).tobytes()
 
 
+@given(
+    arrays(np.float64, (3, 4), elements=components), arrays(np.float64, (3, 4), elements=components)
+)
+def test_arrays_give_what_single_vectors_give_to_the_byte(q, p):
+    """Kernels compute arrays, Python single vectors; both serve the same flights."""
+    v = p[:, :3]
+    q.flags.writeable = False
+    for turned in (rot.rotate(q, v), rot.rotate(q[:, None], v[None])[[0, 1, 2], [0, 1, 2]]):
+        assert turned.tobytes() == np.array([rot.rotate(q[k], v[k]) for k in range(3)]).tobytes()
+    alone = np.array([rot.rotate(q[0], v[k]) for k in range(3)])
+    assert (
+        rot.rotate(q[0], v).tobytes() == rot.rotate(q[:1], v[:, ::1]).tobytes() == alone.tobytes()
+    )
+    assert rot.rotate(q, v[0])[2].tobytes() == rot.rotate(q[2], v[0]).tobytes()
+    both = np.array([rot.multiply(p[k], q[k]) for k in range(3)])
+    assert rot.multiply(p, q).tobytes() == both.tobytes()
+    assert rot.multiply(p[0], q)[2].tobytes() == rot.multiply(p[0], q[2]).tobytes()
+
+
 def test_functions_broadcast_over_leading_axes():
     q = rot.from_rpy(np.zeros((5, 2)), 0.1, 0.2)
     assert q.shape == (5, 2, 4)
     assert rot.rotate(q, np.ones(3)).shape == (5, 2, 3)
+    assert rot.rotate(q[:, None], np.ones((1, 7, 1, 3))).shape == (5, 7, 2, 3)
+    assert rot.rotate(q[:0], np.ones(3)).shape == (0, 2, 3)
     assert rot.matrix(q).shape == (5, 2, 3, 3)
     assert rot.yaw_of(q).shape == (5, 2)

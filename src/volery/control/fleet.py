@@ -501,6 +501,11 @@ class Fleet(FleetCommands):
         """Gives the UAVs `rows` the turbulence of UAVs with `names` in a run with `seed`."""
         self._uavs["turbulence"]["key"][rows] = new_turbulence(seed, names)["key"]
 
+    @property
+    def has_turbulence(self) -> bool:
+        """Whether the air around any UAV is turbulent."""
+        return bool((self._air["w20"] > 0.0).any())
+
     def set_turbulence_keys(self, rows: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
         """Sets the random streams (K,) of the turbulence around the UAVs `rows` (K,)."""
         self._uavs["turbulence"]["key"][rows] = keys
@@ -518,17 +523,29 @@ class Fleet(FleetCommands):
         there.
         """
         start_rows = rows if start_rows is None else start_rows
+        self._restart_rows(start, rows, start_rows)
+        self._set_past(rows, start["position"][0, start_rows], start["attitude"][0, start_rows])
+
+    def _restart_rows(
+        self, start: dict[str, Any], rows: NDArray[np.int64], start_rows: NDArray[np.int64]
+    ) -> None:
+        """Does what `restart` does, apart from the pose history."""
         air_tick = self.step // self._periods[2]
         fresh = restarted_rows(start["uavs"], start_rows, self.step, air_tick)
         fresh["model"] = self._uavs["model"][rows]
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
         as_bytes(self._uavs)[rows] = as_bytes(fresh)
-        self.history.position[:, rows] = start["position"][0, start_rows]
-        self.history.attitude[:, rows] = start["attitude"][0, start_rows]
         if len(self._references) == len(self):
             self._references[rows, :] = start["references"][start_rows, :1]
         if self._variation is not None:
             self._variation.fit(self._models, rows)
+
+    def _set_past(self, rows: NDArray[np.int64], position: Array, attitude: Array) -> None:
+        """Lets the UAVs `rows` (K,) have been at rest in poses (K, 3) and (K, 4) so far."""
+        is_all = np.array_equal(rows, np.arange(len(self)))
+        chosen = slice(None) if is_all else rows  # numpy copies slices much faster
+        self.history.position[:, chosen] = position
+        self.history.attitude[:, chosen] = attitude
 
     def restart_in_flight(
         self, start: dict[str, Any], rows: NDArray[np.int64], motion: FlyingStart
@@ -537,10 +554,9 @@ class Fleet(FleetCommands):
 
         start: a state at step 0 in which the UAVs hold in the air.
         """
-        self.restart(start, rows)
+        self._restart_rows(start, rows, rows)
         set_motion(self._uavs, rows, motion)
-        self.history.position[:, rows] = motion.position_map
-        self.history.attitude[:, rows] = motion.attitude
+        self._set_past(rows, motion.position_map, motion.attitude)
         if len(self._references) == len(self):
             self._references[rows, :, :4] = motion.attitude[:, None]
 

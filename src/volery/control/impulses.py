@@ -36,19 +36,21 @@ def collide(
     sides = [(i, 1.0)] if j is None else [(i, 1.0), (j, -1.0)]
     velocity = np.zeros(3)
     softness = np.zeros((3, 3))
-    spins: list[Array] = []
+    spins: list[Array | None] = []
     for row, sign in sides:
-        turn = rotations.matrix(state.attitude[row])
-        airframe = airframes[row]
-        lever = np.zeros(3)
+        own_softness = np.eye(3) / airframes[row].body.mass_kg
+        own_velocity, spin = state.velocity_map[row], None
         if point_map is not None:
             lever = np.asarray(point_map, dtype=np.float64) - state.position_map[row]
-        cross = np.cross(np.eye(3), lever)  # cross @ f = lever x f
-        inverse = turn @ np.diag(1.0 / np.array(airframe.body.inertia_kg_m2)) @ turn.T
-        spins.append(turn.T @ inverse @ cross)
-        softness += np.eye(3) / airframe.body.mass_kg - cross @ inverse @ cross
-        omega = turn @ state.omega_body[row]
-        velocity += sign * (state.velocity_map[row] + np.cross(omega, lever))
+            turn = rotations.matrix(state.attitude[row])
+            cross = np.cross(np.eye(3), lever)  # cross @ f = lever x f
+            inverse = turn @ np.diag(1.0 / np.array(airframes[row].body.inertia_kg_m2)) @ turn.T
+            spin = turn.T @ inverse @ cross
+            own_softness = own_softness - cross @ inverse @ cross
+            own_velocity = own_velocity + np.cross(turn @ state.omega_body[row], lever)
+        spins.append(spin)
+        softness += own_softness
+        velocity += sign * own_velocity
     closing = -float(velocity @ normal)
     if closing <= 0.0:
         return 0.0
@@ -63,5 +65,6 @@ def collide(
     for (row, sign), spin in zip(sides, spins, strict=True):
         mass = airframes[row].body.mass_kg
         state.velocity_map[row] += sign * impulse / mass
-        state.omega_body[row] += sign * (spin @ impulse)
+        if spin is not None:
+            state.omega_body[row] += sign * (spin @ impulse)
     return norm(impulse)

@@ -59,6 +59,26 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> V
 
 
 @brief_kernel
+def rotate_rows(q: Array, v: Array, out: Array) -> None:
+    """Rotates rows of `v` by rows of `q` into `out` (K, 3); one row of `q` or `v` serves all."""
+    for k in range(len(out)):
+        i, j = k if len(q) > 1 else 0, k if len(v) > 1 else 0
+        out[k, 0], out[k, 1], out[k, 2] = rotate_vector(
+            q[i, 0], q[i, 1], q[i, 2], q[i, 3], v[j, 0], v[j, 1], v[j, 2]
+        )
+
+
+@brief_kernel
+def multiply_rows(p: Array, q: Array, out: Array) -> None:
+    """Composes rows of `p` and `q` into `out` (K, 4); one row of either serves all."""
+    for k in range(len(out)):
+        i, j = k if len(p) > 1 else 0, k if len(q) > 1 else 0
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = quaternion_product(
+            p[i, 0], p[i, 1], p[i, 2], p[i, 3], q[j, 0], q[j, 1], q[j, 2], q[j, 3]
+        )
+
+
+@brief_kernel
 def moved_points(points: Array, attitude: Array, position: Array) -> Array:
     """Rotates points (K, 3) by `attitude` (4,) and shifts them by `position` (3,)."""
     x, y, z, w = attitude[0], attitude[1], attitude[2], attitude[3]

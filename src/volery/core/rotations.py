@@ -6,7 +6,7 @@ Functions take arrays whose last axis is the quaternion or vector and broadcast 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,25 +27,41 @@ def _components(array: ArrayLike) -> Sequence[Any]:
     return [array[..., k] for k in range(array.shape[-1])]
 
 
-def _together(*components: Any) -> Array:
-    """Joins arrays or numbers along a new last axis."""
-    if type(components[0]) is float:
-        return np.array(components)
-    joined = np.empty((*components[0].shape, len(components)))  # np.stack is several times slower
-    for k, component in enumerate(components):
-        joined[..., k] = component
-    return joined
+def _by_rows(compute: Callable[[Array, Array, Array], None], a: Array, b: Array) -> Array:
+    """Returns what a kernel computes of rows of `a` and `b`, in the shape of both and of `b`."""
+    leading, shared = a.shape[:-1], b.shape[:-1]
+    if leading != shared:
+        shape = np.broadcast_shapes(leading, shared)
+        a, b = (x if x.ndim == 1 else np.broadcast_to(x, (*shape, x.shape[-1])) for x in (a, b))
+        shared = shape
+    out = np.empty((*shared, b.shape[-1]))
+    compute(_rows(a), _rows(b), out.reshape(-1, b.shape[-1]))
+    return out
+
+
+def _rows(array: Array) -> Array:
+    """Returns an array as rows in one layout, for which the kernels are compiled once."""
+    rows = array.reshape(-1, array.shape[-1])
+    flags = rows.flags
+    return rows if flags.c_contiguous and flags.writeable else rows.copy()
 
 
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Returns p q (..., 4): `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`."""
-    px, py, pz, pw = _components(p)
-    qx, qy, qz, qw = _components(q)
-    return _together(
-        pw * qx + px * qw + py * qz - pz * qy,
-        pw * qy - px * qz + py * qw + pz * qx,
-        pw * qz + px * qy - py * qx + pz * qw,
-        pw * qw - px * qx - py * qy - pz * qz,
+    p, q = np.asarray(p, np.float64), np.asarray(q, np.float64)
+    if p.ndim > 1 or q.ndim > 1:
+        from volery.core.rotation_kernels import multiply_rows  # numba, which starts slowly
+
+        return _by_rows(multiply_rows, p, q)
+    px, py, pz, pw = p.tolist()
+    qx, qy, qz, qw = q.tolist()
+    return np.array(
+        [
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+            pw * qw - px * qx - py * qy - pz * qz,
+        ]
     )
 
 
@@ -62,13 +78,20 @@ def normalize(q: ArrayLike) -> Array:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     """Rotates vectors `v` (..., 3) by `q` (..., 4)."""
-    x, y, z, w = _components(q)
-    vx, vy, vz = _components(v)
+    q, v = np.asarray(q, np.float64), np.asarray(v, np.float64)
+    if q.ndim > 1 or v.ndim > 1:
+        from volery.core.rotation_kernels import rotate_rows  # numba, which starts slowly
+
+        return _by_rows(rotate_rows, q, v)
+    x, y, z, w = q.tolist()
+    vx, vy, vz = v.tolist()
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
-    return _together(
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
+    return np.array(
+        [
+            vx + w * tx + y * tz - z * ty,
+            vy + w * ty + z * tx - x * tz,
+            vz + w * tz + x * ty - y * tx,
+        ]
     )
 
 

@@ -156,7 +156,7 @@ class Collisions:
         """Resets UAVs: they are in no contact, and are checked at once."""
         self._touched_solid[rows] = -1
         self._touching_uav[rows] = False
-        for row in rows.tolist():
+        for row in rows.tolist() if self._uavs_per_env > 1 else ():
             env = self._rows_of_env(row)
             self._touching_uav[env, row - env.start] = False
         if self._actors is not None:

@@ -55,6 +55,9 @@ class SensorBank(Bank, Protocol):
     def wanted(self) -> Callable[[], bool] | None:
         """Returns whether the next measurement has receivers; None: it is always made."""
 
+    def sample_rows(self, rows: NDArray[np.int64], k: int, time_ns: int, fleet: Fleet) -> Samples:
+        """Returns what `sample` returns for the sensors `rows` (R,); others may have anything."""
+
 
 class Sink(Protocol):
     """Receives samples and events."""
@@ -121,8 +124,8 @@ class Engine:
         self.sink = sink
         self.inbox = inbox or CommandQueue()
         self.fuses_ticks = fuses_ticks
-        """Whether a tick goes on after distance queries that find no contact, also in a run with
-        `until`, which is then asked less often; states are the same."""
+        """Whether a tick goes on after events, and after distance queries that find no contact also
+        in a run with `until`, which is then asked less often; states and events are the same."""
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called repeatedly while waiting for a lock-step partner; returns whether the run
         continues."""

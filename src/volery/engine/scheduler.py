@@ -75,7 +75,12 @@ class Scheduler(Generic[What]):
         step, _, first = self._heap[0]
         if first.wanted is None or first.wanted():
             return step
-        return self.next_step_of(lambda _what: True)
+        nearest = None
+        for step, _, entry in self._heap:
+            is_nearer = nearest is None or step < nearest
+            if is_nearer and (entry.wanted is None or entry.wanted()):
+                nearest = step
+        return nearest
 
     def next_step_of(self, chosen: Callable[[What], bool]) -> int | None:
         """Returns the step of the next firing of the chosen entries, None without one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from volery.control.fleet import Fleet
 from volery.engine.scheduler import Scheduler
 from volery.sensors.bank import Bank, rows_of, uav_rows
 from volery.sensors.samples import Samples
+
+if TYPE_CHECKING:
+    from volery.engine.engine import SensorBank
 
 
 class Streams(Protocol):
@@ -45,7 +48,7 @@ class NamedStreams:
 
 def restart_sensors(
     agenda: Scheduler[Any],
-    banks: Sequence[Bank],
+    banks: Sequence[SensorBank],
     fleet: Fleet,
     uavs: NDArray[np.int64],
     streams: Streams,
@@ -67,7 +70,7 @@ def restart_sensors(
         before = bank.get_state()
         bank.reset(uavs, streams.of(bank, rows), time_ns, k)
         if measures_now and bank.lag_ns == 0:
-            samples = bank.sample(k, time_ns, fleet)
+            samples = bank.sample_rows(rows, k, time_ns, fleet)
             bank.set_state(_with_rows(before, bank.get_state(), rows, len(bank.sensors)))
             fresh.append((samples, rows))
     return fresh

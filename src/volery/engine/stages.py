@@ -45,12 +45,13 @@ def take_commands(engine: Engine, tick: Tick) -> None:
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
     """Runs control and dynamics, fused, until the horizon, an event or a distance query."""
     first, fleet = engine.fleet.step, engine.fleet
-    last = engine.horizon(tick.last_step)
+    last, event_ends = engine.horizon(tick.last_step), not engine.fuses_ticks
     while fleet.step < last:
         fleet.advance(
-            last - fleet.step, engine.terrain, event_ends=True, workers=engine.scene.workers
+            last - fleet.step, engine.terrain, event_ends=event_ends, workers=engine.scene.workers
         )
-        if not tick.fuses or fleet.has_events or not engine.collisions.refill():
+        ends = fleet.has_events and event_ends
+        if not tick.fuses or ends or not engine.collisions.refill():
             break
     if fleet.step > first:
         engine.turn = 0

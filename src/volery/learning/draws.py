@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.arrays import Array
+from volery.core.compiled import brief_kernel
+from volery.core.rng import random_bits, uniform
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
-_TWO_M53 = 2.0**-53
 _SEEDS = np.uint64((1 << 63) - 1)
 
 
 class Draws:
     """Streams of K environments: the numbers of one depend on its seed and on its draws alone.
 
-    The generator is that of `core.rng`, as array operations.
+    The generator is that of `core.rng`.
     """
 
     def __init__(self, num_envs: int) -> None:
@@ -26,12 +26,13 @@ class Draws:
 
     def seed(self, rows: NDArray[np.int64], seeds: ArrayLike) -> None:
         """Restarts the streams of the environments `rows` (R,) with `seeds` (R,), integers."""
-        self._keys[rows] = _bits(np.asarray(seeds, np.uint64), np.zeros(1, np.uint64))
+        numbers = np.broadcast_to(np.asarray(seeds, np.uint64), rows.shape).copy()
+        self._keys[rows] = _bits(numbers, np.zeros_like(numbers))
         self._counters[rows] = 0
 
     def episode_seeds(self, rows: NDArray[np.int64]) -> list[int]:
         """Returns a seed (R,) of the simulation for a new episode of each of `rows`."""
-        seeds: list[int] = (self._next(rows, 1)[:, 0] & _SEEDS).tolist()
+        seeds: list[int] = (_bits(*self._next(rows, 1)) & _SEEDS).tolist()
         return seeds
 
     def uniform(
@@ -68,20 +69,32 @@ class Draws:
 
     def _unit(self, rows: NDArray[np.int64], shape: tuple[int, ...]) -> Array:
         """Returns uniform numbers (R, *shape) in (0, 1)."""
-        bits = self._next(rows, int(np.prod(shape)))
-        unit = ((bits >> _S11).astype(np.float64) + 0.5) * _TWO_M53
-        return unit.reshape(len(rows), *shape)
+        numbers = math.prod(shape)
+        return _units(*self._next(rows, numbers), numbers).reshape(len(rows), *shape)
 
-    def _next(self, rows: NDArray[np.int64], numbers: int) -> NDArray[np.uint64]:
-        counters = np.add.outer(self._counters[rows], np.arange(numbers, dtype=np.uint64))
+    def _next(
+        self, rows: NDArray[np.int64], numbers: int
+    ) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+        """Returns keys and first counters (R,) of the next `numbers`, which are then used up."""
+        counters = self._counters[rows]
         self._counters[rows] += np.uint64(numbers)
-        return _bits(self._keys[rows][:, None], counters.astype(np.uint64))
+        return self._keys[rows], counters
 
 
+@brief_kernel
 def _bits(keys: NDArray[np.uint64], counters: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Returns random bits, as `core.rng.random_bits` of arrays that broadcast."""
-    with np.errstate(over="ignore"):
-        z = keys + (counters + np.uint64(1)) * _GOLDEN
-        z = (z ^ (z >> _S30)) * _MIX_1
-        z = (z ^ (z >> _S27)) * _MIX_2
-    return np.asarray(z ^ (z >> _S31))
+    """Returns random bits (R,): number `counters` of each stream."""
+    bits = np.empty(len(keys), np.uint64)
+    for i in range(len(keys)):
+        bits[i] = random_bits(keys[i], counters[i])
+    return bits
+
+
+@brief_kernel
+def _units(keys: NDArray[np.uint64], counters: NDArray[np.uint64], numbers: int) -> Array:
+    """Returns uniform numbers (R, `numbers`) in (0, 1), from `counters` of each stream on."""
+    units = np.empty((len(keys), numbers))
+    for i in range(len(keys)):
+        for j in range(numbers):
+            units[i, j] = uniform(keys[i], counters[i] + np.uint64(j))
+    return units

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from volery.core.errors import ScenarioError, SensorError
 from volery.learning.draws import Draws
 from volery.runtime.environment_block import SampleArrays
 from volery.runtime.vectorized_simulation import VectorizedSimulation
+from volery.runtime.vehicles.batch_commands import PresentState
 from volery.vehicle.fleet import FleetState
 
 _ODOMETRY = "odom"
@@ -51,7 +52,7 @@ class Flight:
         """Parameters (K,) of the present episodes, by name: those of the task or its curriculum."""
         self.varied: dict[str, Array] = {}
         """Numbers (K, n, size) that the task's randomization drew, by name."""
-        self._state: FleetState | None = None
+        self._state: PresentState | None = None
         self._estimate: FleetState | None = None
         self._is_estimated = False
         self._attitude_inverse: Array | None = None
@@ -60,6 +61,8 @@ class Flight:
 
     def refresh(self) -> None:
         """Marks the state as changed."""
+        if self._state is not None:
+            self._state.expire()
         self._state = self._estimate = self._attitude_inverse = None
         self._samples.clear()
         self._has_sample.clear()
@@ -70,13 +73,13 @@ class Flight:
 
         In observations of the source "estimate" pose, velocity and rates are the estimated ones.
         """
+        if self._is_estimated:
+            if self._estimate is None:
+                self._estimate = _estimated_state(self.envs)
+            return self._estimate
         if self._state is None:
-            self._state = self.envs.state()
-        if not self._is_estimated:
-            return self._state
-        if self._estimate is None:
-            self._estimate = _estimated_state(self.envs, self._state)
-        return self._estimate
+            self._state = self.envs.present_state()
+        return cast(FleetState, self._state)
 
     def seen_from(
         self, source: Literal["truth", "estimate"], function: Callable[[Flight], Array]
@@ -132,14 +135,15 @@ class Flight:
         return observation_terms.to_heading(self.state.attitude, vectors_map)
 
 
-def _estimated_state(envs: VectorizedSimulation, truth: FleetState) -> FleetState:
-    """Returns `truth`, arrays (K, n, ...), with pose, velocity and rates from the sensor `odom`.
+def _estimated_state(envs: VectorizedSimulation) -> FleetState:
+    """Returns the state, arrays (K, n, ...), with pose, velocity and rates from the sensor `odom`.
 
     Environments without a sample since their reset have the true ones. Raises `ScenarioError` for
     a UAV without that sensor.
     """
-    position, attitude = truth.position_map.copy(), truth.attitude.copy()
-    velocity, omega = truth.velocity_map.copy(), truth.omega_body.copy()
+    truth = envs.state()
+    position, attitude = truth.position_map, truth.attitude
+    velocity, omega = truth.velocity_map, truth.omega_body
     for number, uav in enumerate(envs.uav_names):
         if _ODOMETRY not in envs.sensors[uav]:
             raise ScenarioError(
@@ -159,12 +163,7 @@ def _estimated_state(envs: VectorizedSimulation, truth: FleetState) -> FleetStat
         turned = rotations.rotate(sample.attitude[has], sample.velocity_body[has])
         velocity[has, number] = turned
         omega[has, number] = sample.omega_body[has]
-    return truth._replace(
-        position_map=position,
-        attitude=attitude,
-        velocity_map=velocity,
-        omega_body=np.asarray(omega),
-    )
+    return truth
 
 
 def _stacked(parts: list[SampleArrays]) -> SampleArrays:

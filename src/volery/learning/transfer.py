@@ -24,10 +24,10 @@ from volery.learning.tags.full_simulation import add_tag, observes_tag, place_ta
 from volery.learning.task import Task
 from volery.runtime.simulation import Simulation
 from volery.runtime.vectorized_simulation import VectorizedSimulation
+from volery.runtime.vehicles.batch_commands import PresentState
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe
-from volery.vehicle.fleet import FleetState
 
 _SENSORS: tuple[dict[str, Any], ...] = (
     {"kind": "imu"},
@@ -139,9 +139,9 @@ class _OneEnvironment:
     def airframes(self) -> tuple[Airframe, ...]:
         return tuple(uav.airframe for uav in self._simulation.uavs.values())
 
-    def state(self) -> FleetState:
+    def present_state(self) -> PresentState:
         state = self._simulation.vehicles.state()
-        return FleetState._make(np.asarray(array)[None] for array in state)
+        return PresentState([state], (1, len(self.uav_names)))
 
 
 class _Episode:

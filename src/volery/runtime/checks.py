@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,14 @@ def check_reset_seed(scenario: Scenario, seed: Any) -> None:
             f"new simulation of scenario.with_(seed={seed}). To reset in this world, fix it first: "
             f'scenario.with_(world={{"seed": {scenario.seed}}})'
         )
+
+
+def check_reset_seeds(scenario: Scenario, seeds: Sequence[Any]) -> None:
+    """Raises `CommandError` if one of the seeds of resets is not possible; see above."""
+    plain = all(type(seed) is int for seed in seeds) and not scenario.has_seeded_world
+    if not (plain and seeds and min(seeds) >= 0 and max(seeds) < 2**63):
+        for seed in seeds:
+            check_reset_seed(scenario, seed)
 
 
 def check_seed(seed: Any) -> None:

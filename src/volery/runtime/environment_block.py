@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.control.fleet_variation import FleetParameters
 from volery.control.flying_start import FlyingStart
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError, DivergenceError, SensorError
@@ -114,7 +115,9 @@ class EnvironmentBlock:
         self.futures = futures = FlightFutures(self._fleet_row_of, runs)
         self._engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._streams = EnvironmentStreams(self._fitted, len(self._starts), banks, self.seeds)
-        self._stir_air(np.arange(num_envs))
+        self._unstirred = np.ones(num_envs, np.bool_)
+        """(num_envs,) whether the turbulence has not yet the stream of the present seed."""
+        self._stir_air()
         self._landed_state = self.fleet.get_state()
         self._flying_state: dict[str, Any] | None = None
         self._is_estimated = estimation is not None
@@ -182,7 +185,8 @@ class EnvironmentBlock:
             for k, seed in zip(envs.tolist(), seeds, strict=True):
                 self.seeds[k] = seed
             self._streams.renew(envs)
-            self._stir_air(envs)
+            self._unstirred[envs] = True
+        self._stir_air()
         self._engine.collisions.forget(rows)
         self._began_ns[envs] = self.time_ns
         if self.futures.has_pending:
@@ -193,6 +197,11 @@ class EnvironmentBlock:
             self._renew(samples, fresh)
         if motion is None and self._is_estimated:
             self._take_off(rows)
+
+    def vary(self, envs: NDArray[np.int64], parameters: FleetParameters) -> None:
+        """Sets physical parameters of the R * n UAVs of the environments `envs` (R,)."""
+        self.fleet.vary(rows_of_environments(envs, len(self._starts)), parameters)
+        self._stir_air()
 
     def get_state(self) -> dict[str, Any]:
         """Returns everything that changes."""
@@ -222,6 +231,8 @@ class EnvironmentBlock:
         self.seeds[:] = state["seeds"]
         self._enter(np.arange(len(self.seeds)), state["world"])
         self._streams.renew(np.arange(len(self.seeds)))
+        self._unstirred[:] = True
+        self._stir_air()
 
     def restore(self, envs: NDArray[np.int64], state: dict[str, Any]) -> None:
         """Restores the environments `envs` (R,) alone; see `VectorizedSimulation.set_state`.
@@ -240,6 +251,8 @@ class EnvironmentBlock:
         for env in envs.tolist():
             self.seeds[env] = state["seeds"][env]
         self._streams.renew(envs)
+        self._unstirred[envs] = True
+        self._stir_air()
         if self.futures.has_pending:
             for path in self._paths_of(rows):
                 self.futures.fail(path, "another state was restored")
@@ -453,8 +466,12 @@ class EnvironmentBlock:
             self.fleet.set_state(present)
         return self._flying_state
 
-    def _stir_air(self, envs: NDArray[np.int64]) -> None:
-        """Seeds the turbulence of each environment."""
+    def _stir_air(self) -> None:
+        """Seeds the turbulence of environments with new seeds, once there is turbulence."""
+        if not self.fleet.has_turbulence:
+            return
+        envs = np.flatnonzero(self._unstirred)
+        self._unstirred[envs] = False
         num_uavs = len(self._starts)
         rows = envs[:, None] * num_uavs + np.arange(num_uavs)
         for index, start in enumerate(self._starts):

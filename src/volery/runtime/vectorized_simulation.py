@@ -31,14 +31,14 @@ from volery.core.arrays import Array
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
-from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
+from volery.runtime.checks import check_reset_seeds, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
 from volery.runtime.environment_parameters import EnvironmentParameters, rows_of_environments
 from volery.runtime.environment_runs import EnvironmentRuns
 from volery.runtime.environment_sensors import EnvironmentSensors
 from volery.runtime.environment_start import EnvironmentStart
 from volery.runtime.environment_worlds import EnvironmentWorlds
-from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
+from volery.runtime.vehicles.batch_commands import BatchCommands, PresentState, joined_states
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
@@ -211,8 +211,7 @@ class VectorizedSimulation(BatchCommands):
         chosen = self._chosen(envs)
         num_uavs = len(self._starts)
         motion = None if start is None else start.spread(len(chosen), num_uavs)
-        for seed in seeds or ():
-            check_reset_seed(self.scenario, seed)
+        check_reset_seeds(self.scenario, seeds or ())
         if seeds is not None and len(seeds) != len(chosen):
             raise CommandError(_without_seeds(len(chosen), len(seeds)))
         moved = None if worlds is None else self._checked_worlds(worlds, len(chosen))
@@ -240,7 +239,7 @@ class VectorizedSimulation(BatchCommands):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):
                 own = every.rows(rows_of_environments(here, num_uavs))
-                block.fleet.vary(rows_of_environments(chosen[here] - first, num_uavs), own)
+                block.vary(chosen[here] - first, own)
 
     def get_state(self) -> list[Any]:
         """Returns the present state of all environments, for `set_state`."""
@@ -290,6 +289,10 @@ class VectorizedSimulation(BatchCommands):
     def state(self) -> FleetState:
         """Returns copies of the present states of all UAVs; each array is (K, n, ...)."""
         return joined_states([block.fleet.state for block in self._blocks], self._batch_shape)
+
+    def present_state(self) -> PresentState:
+        """Returns the fields of `state()`, each copied when it is read first."""
+        return PresentState([block.fleet.state for block in self._blocks], self._batch_shape)
 
     @property
     def modes(self) -> NDArray[np.int64]:

@@ -242,6 +242,16 @@ class FaultableBank:
         """Returns measurement number `k` with the faults applied; see `Bank.sample`."""
         return self.faults.apply(self.bank.sample(k, time_ns, fleet), k)
 
+    def sample_rows(self, rows: NDArray[np.int64], k: int, time_ns: int, fleet: Fleet) -> Samples:
+        """Returns what `sample` returns for the sensors `rows` (R,); others may have anything.
+
+        Cameras render the images of `rows` alone.
+        """
+        sample = getattr(self.bank, "sample_rows", None)
+        if sample is None:
+            return self.sample(k, time_ns, fleet)
+        return self.faults.apply(sample(rows, k, time_ns, fleet), k)
+
     def get_state(self) -> dict[str, Any]:
         """Returns the state of the bank and its faults."""
         return {"bank": self.bank.get_state(), "faults": self.faults.get_state()}

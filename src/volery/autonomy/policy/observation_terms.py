@@ -28,9 +28,8 @@ def to_heading(attitude: ArrayLike, vectors_map: ArrayLike) -> Array:
 
 def rotation_rows(attitude: ArrayLike) -> Array:
     """Returns rotation matrices, map from body, row by row (..., 9)."""
-    columns = [rotations.rotate(attitude, axis) for axis in np.eye(3)]
-    matrix = np.stack(columns, axis=-1)
-    return matrix.reshape(*matrix.shape[:-2], 9)
+    columns = rotations.rotate(np.asarray(attitude)[..., None, :], np.eye(3))
+    return np.swapaxes(columns, -1, -2).reshape(*columns.shape[:-2], 9)
 
 
 def scaled(numbers: ArrayLike, scale: float, limit: float) -> Array:

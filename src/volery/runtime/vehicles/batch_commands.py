@@ -337,8 +337,32 @@ def _of(yaws: Array | None, rows: slice) -> Array | None:
 
 def joined_states(states: Sequence[FleetState], shape: tuple[int, ...]) -> FleetState:
     """Returns copies of the states of fleets as one, its arrays in `shape` (n,) or (K, n)."""
+    return FleetState(*(_joined(arrays, shape) for arrays in zip(*states, strict=True)))  # type: ignore[arg-type]
 
-    def join(arrays: tuple[NDArray[np.generic], ...]) -> NDArray[np.generic]:
-        return np.concatenate(arrays).reshape(*shape, *arrays[0].shape[1:])
 
-    return FleetState(*(join(arrays) for arrays in zip(*states, strict=True)))  # type: ignore[arg-type]
+class PresentState:
+    """The fields of `joined_states`, each copied when it is read first: before the next step.
+
+    A field that is read later raises `CommandError`, once `expire` has been called.
+    """
+
+    def __init__(self, states: Sequence[FleetState], shape: tuple[int, ...]) -> None:
+        self._states: Sequence[FleetState] | None = states
+        self._shape = shape
+
+    def expire(self) -> None:
+        """Ends the present; fields that have been read remain."""
+        self._states = None
+
+    def __getattr__(self, name: str) -> NDArray[np.generic]:
+        if name not in FleetState._fields:
+            raise AttributeError(f"a state has no field '{name}'")
+        if self._states is None:
+            raise CommandError(f"{name} was not read before the next step; read it again there")
+        array = _joined([getattr(state, name) for state in self._states], self._shape)
+        setattr(self, name, array)
+        return array
+
+
+def _joined(arrays: Sequence[NDArray[np.generic]], shape: tuple[int, ...]) -> NDArray[np.generic]:
+    return np.concatenate(arrays).reshape(*shape, *arrays[0].shape[1:])

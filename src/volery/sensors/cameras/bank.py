@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import read_only
@@ -73,12 +74,18 @@ class CameraBank(NoisyBank):
         Parts without a receiver have no pixels, (S, 0, 0), unless none has one: then all are
         rendered.
         """
+        return self.sample_rows(np.arange(len(self._rows)), k, time_ns, fleet)
+
+    def sample_rows(
+        self, rows: NDArray[np.int64], k: int, time_ns: int, fleet: Fleet
+    ) -> CameraFrames:
+        """Returns what `sample` returns for the cameras `rows` (R,); those of others are black."""
         batch = make_batch(
-            self._rows,
-            np.arange(len(self._rows)),
+            self._rows[rows],
+            rows,
             time_ns,
-            self._noise.keys,
-            k - self._noise.first_k,
+            self._noise.keys[rows],
+            k - self._noise.first_k[rows],
             self._mounts,
         )
         parts = self.requested_parts() or EVERY_PART
@@ -93,16 +100,25 @@ class CameraBank(NoisyBank):
             parts=parts,
             falling=falling_in(fleet.weather, light),
         )
-        return CameraFrames(self.sensors, time_ns, self.model, **_arrays(images))
+        arrays = _arrays(images, rows, len(self._rows))
+        return CameraFrames(self.sensors, time_ns, self.model, **arrays)
 
 
-def _arrays(images: Images) -> dict[str, Any]:
-    """Returns the arrays of all parts; a part that was not rendered has no pixels."""
-    count = next(len(part) for part in images if part is not None)
-    return {
-        name: read_only(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)
-        for name, part in images._asdict().items()
-    }
+def _arrays(images: Images, rows: NDArray[np.int64], count: int) -> dict[str, Any]:
+    """Returns arrays of `count` images, of which `images` are `rows` and the others zero.
+
+    A part that was not rendered has no pixels.
+    """
+    arrays: dict[str, Any] = {}
+    for name, part in images._asdict().items():
+        whole = part
+        if part is None:
+            whole = np.zeros((count, 0, 0), _KINDS[name])
+        elif len(rows) < count:
+            whole = np.zeros((count, *part.shape[1:]), part.dtype)
+            whole[rows] = part
+        arrays[name] = read_only(whole)
+    return arrays
 
 
 _KINDS: dict[str, type] = {
