@@ -27,7 +27,7 @@ from volery_benchmarks.cluster import namespaces
 
 _LOG = logging.getLogger(__name__)
 _PORT = 6379
-_RUNS, _QUICK_RUNS = 300, 40
+_RUNS, _QUICK_RUNS = 3_000, 600
 _START_S = 120.0
 _STUDY = """name = "two"
 scenario = "hover"

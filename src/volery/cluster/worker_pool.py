@@ -16,6 +16,8 @@ from volery.cluster.runs import difference, versions
 _AHEAD = 2
 """Batches of a worker: the next one waits, so that the worker does not."""
 _LOOK_S = 0.5
+_MAX_LOST_STARTS = 3
+"""Workers that may end in a row before their first run, while others fly."""
 TIMED_OUT = "exceeded the timeout"
 """Beginning of the reason of a loss by a timeout."""
 
@@ -44,6 +46,7 @@ class WorkerPool:
         self._waiting: deque[RunBatch] = deque()
         """Batches of ended workers that had not begun."""
         self._started = 0
+        self._lost_starts = 0
 
     @property
     def num_workers(self) -> int:
@@ -126,6 +129,7 @@ class WorkerPool:
         if message.error:
             raise StudyError(f"{self._job.where}: {message.error}")
         worker.is_ready = True
+        self._lost_starts = 0
         return message
 
     def _taken(self, worker: PoolWorker, message: object) -> list[BatchResult | BatchLoss]:
@@ -139,10 +143,18 @@ class WorkerPool:
             self._pass_on()
             return [message]
         if not worker.is_ready:
+            if message is None and self._may_lose():
+                return self._replaced(worker)
             self._prepared(worker, message)
             self._pass_on()
             return []
         return self._replaced(worker)
+
+    def _may_lose(self) -> bool:
+        """Returns whether a worker that ends before its first run is replaced."""
+        self._lost_starts += 1
+        is_flying = any(worker.is_ready for worker in self._workers)
+        return is_flying and self._lost_starts <= _MAX_LOST_STARTS
 
     def _replaced(self, worker: PoolWorker) -> list[BatchResult | BatchLoss]:
         """Replaces a worker that has ended; returns the loss of the batch that it was flying."""

@@ -9,7 +9,8 @@ import pytest
 from studies import TINY, study_file
 
 from volery.cluster import StudyError, load_study, run_study
-from volery.cluster.batches import StudyJob
+from volery.cluster.batches import Preparation, StudyJob
+from volery.cluster.pool_worker import PoolWorker
 from volery.cluster.process_worker import ProcessWorker
 from volery.cluster.runs import versions
 from volery.cluster.worker_pool import WorkerPool
@@ -43,6 +44,53 @@ def test_a_worker_that_cannot_start_is_named(tmp_path, monkeypatch):
     job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
     with pytest.raises(StudyError, match="a worker cannot start: No such file"):
         pool_of(job, tmp_path).prepare()
+
+
+class StandIn(PoolWorker):
+    """A worker that answers at once; its number decides whether it ends when the job comes."""
+
+    def __init__(self, number, replies, lost):
+        super().__init__(f"worker {number}")
+        self.is_lost, self.replies = number in lost, replies
+        replies.put((self, Preparation(versions())))
+
+    def send_job(self, job):
+        self.replies.put((self, None if self.is_lost else Preparation(versions())))
+
+    def end(self, reason):
+        self.replies.put((self, None))
+
+    def how_it_ended(self):
+        return "was lost"
+
+    def close(self):
+        pass
+
+    def _send_batch(self, batch):
+        pass
+
+
+def stand_ins(folder, lost):
+    loaded = load_study(TINY)
+    job = StudyJob(loaded.study, "study", folder, False, loaded.points[0], folder)
+    return WorkerPool(job, 2, lambda number, replies: StandIn(number, replies, lost))
+
+
+def test_a_worker_that_is_lost_before_its_first_run_is_replaced_while_another_flies(tmp_path):
+    pool = stand_ins(tmp_path, lost={2, 3})
+    pool.prepare()
+    while len([one for one in pool.states() if one.state == "idle"]) < 2:
+        assert pool.collect(0.1) == ()
+    assert [one.name for one in pool.states()] == ["worker 1", "worker 4"]
+
+
+def test_a_study_ends_where_no_worker_starts(tmp_path):
+    with pytest.raises(StudyError, match="worker 1 was lost before its first run"):
+        stand_ins(tmp_path, lost={1}).prepare()
+    pool = stand_ins(tmp_path, lost={2, 3, 4, 5})
+    pool.prepare()
+    with pytest.raises(StudyError, match="worker 5 was lost before its first run"):
+        pool.collect(60.0)
 
 
 MINE = """
