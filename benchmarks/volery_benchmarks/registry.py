@@ -426,7 +426,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "learning",
-            "Learning: decisions per second of 1,024 environments (128 with depth images) on two "
+            "Learning: decisions per second of 1,024 environments (256 with depth images) on two "
             "threads, rewards, ends and automatic resets included; trainings with the shipped "
             "configurations, median of five seeds; shipped policies in 200 episodes never trained "
             "on, and in the full simulation (`transfer`: estimator, sensor noise, 20 ms latency)",

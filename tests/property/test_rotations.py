@@ -1,6 +1,7 @@
 """Rotations obey the axioms of their group and agree with matrices and scipy."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -91,5 +92,8 @@ def test_functions_broadcast_over_leading_axes():
     assert rot.rotate(q, np.ones(3)).shape == (5, 2, 3)
     assert rot.rotate(q[:, None], np.ones((1, 7, 1, 3))).shape == (5, 7, 2, 3)
     assert rot.rotate(q[:0], np.ones(3)).shape == (0, 2, 3)
+    for wrong in ((q[..., :3], np.ones(3)), (q, np.ones((2, 4))), (q, np.ones((3, 3)))):
+        with pytest.raises(ValueError, match="shape"):
+            rot.rotate(*wrong)
     assert rot.matrix(q).shape == (5, 2, 3, 3)
     assert rot.yaw_of(q).shape == (5, 2)

@@ -27,16 +27,29 @@ def _components(array: ArrayLike) -> Sequence[Any]:
     return [array[..., k] for k in range(array.shape[-1])]
 
 
-def _by_rows(compute: Callable[[Array, Array, Array], None], a: Array, b: Array) -> Array:
-    """Returns what a kernel computes of rows of `a` and `b`, in the shape of both and of `b`."""
-    leading, shared = a.shape[:-1], b.shape[:-1]
-    if leading != shared:
-        shape = np.broadcast_shapes(leading, shared)
-        a, b = (x if x.ndim == 1 else np.broadcast_to(x, (*shape, x.shape[-1])) for x in (a, b))
-        shared = shape
-    out = np.empty((*shared, b.shape[-1]))
-    compute(_rows(a), _rows(b), out.reshape(-1, b.shape[-1]))
+def _by_rows(
+    compute: Callable[[Array, Array, Array], None], a: Array, b: Array, width: int
+) -> Array:
+    """Returns what a kernel computes of rows of `a` (..., 4) and `b` (..., width): (..., width).
+
+    Raises `ValueError` for other shapes: kernels do not check them.
+    """
+    if a.shape[-1:] != (4,) or b.shape[-1:] != (width,):
+        raise ValueError(f"shapes (..., 4) and (..., {width}) are needed, not {a.shape}, {b.shape}")
+    shape = a.shape[:-1] or b.shape[:-1]
+    if b.ndim > 1 and b.shape[:-1] != shape:
+        shape = np.broadcast_shapes(shape, b.shape[:-1])
+        a, b = (_spread(a, shape), _spread(b, shape))
+    out = np.empty((*shape, width))
+    compute(_rows(a), _rows(b), out.reshape(-1, width))
     return out
+
+
+def _spread(array: Array, shape: tuple[int, ...]) -> Array:
+    """Broadcasts the leading axes of an array to `shape`, unless one row serves all."""
+    if array.ndim == 1 or array.shape[:-1] == shape:
+        return array
+    return np.broadcast_to(array, (*shape, array.shape[-1]))
 
 
 def _rows(array: Array) -> Array:
@@ -52,7 +65,7 @@ def multiply(p: ArrayLike, q: ArrayLike) -> Array:
     if p.ndim > 1 or q.ndim > 1:
         from volery.core.rotation_kernels import multiply_rows  # numba, which starts slowly
 
-        return _by_rows(multiply_rows, p, q)
+        return _by_rows(multiply_rows, p, q, 4)
     px, py, pz, pw = p.tolist()
     qx, qy, qz, qw = q.tolist()
     return np.array(
@@ -82,7 +95,7 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
     if q.ndim > 1 or v.ndim > 1:
         from volery.core.rotation_kernels import rotate_rows  # numba, which starts slowly
 
-        return _by_rows(rotate_rows, q, v)
+        return _by_rows(rotate_rows, q, v, 3)
     x, y, z, w = q.tolist()
     vx, vy, vz = v.tolist()
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
