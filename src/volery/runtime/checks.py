@@ -51,7 +51,7 @@ def check_reset_seed(scenario: Scenario, seed: Any) -> None:
 
 
 def check_reset_seeds(scenario: Scenario, seeds: Sequence[Any]) -> None:
-    """Raises `CommandError` if one of the seeds of resets is not possible; see above."""
+    """Raises `CommandError` if `check_reset_seed` refuses one of `seeds`; many are checked fast."""
     plain = all(type(seed) is int for seed in seeds) and not scenario.has_seeded_world
     if not (plain and seeds and min(seeds) >= 0 and max(seeds) < 2**63):
         for seed in seeds:

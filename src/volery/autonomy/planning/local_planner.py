@@ -22,10 +22,12 @@ from volery.autonomy.planning.receding_horizon import (
 )
 from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
 from volery.autonomy.planning.surroundings import Surroundings
+from volery.autonomy.planning.tracking_error import TrackingError
 from volery.autonomy.planning.trajectory_messages import trajectory_message
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.saved_state import SavedAttributes
+from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
     JointState,
@@ -83,6 +85,15 @@ _LOOKAHEAD_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""
 _MIN_HEIGHT_M = 1.0
 """Height above ground below which the planner is inactive: the vehicle takes off or lands."""
+_STOPPING_M, _MIN_SPEED = 1.5, 0.3
+"""Margin for disturbances at which the speed would be zero, m; smallest fraction of it."""
+_MAX_RADIUS_M = 1.5
+"""Largest radius with its margin, m: distances are measured up to 1.75 m."""
+_SOFT_M = 0.8
+"""Distance beyond the radius in which obstacles add cost, m."""
+PUSHED = "the UAV is pushed off its plans: it flies slower, farther from obstacles"
+_DISTURBED_M = 0.2
+"""Margin for disturbances from which the status mentions it, m."""
 _STATUS_PERIOD_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
 
@@ -112,7 +123,7 @@ class LocalPlanner(SavedAttributes, Node):
 
     """
 
-    PARTS = ("_sight", "_planning", "_frame")
+    PARTS = ("_sight", "_planning", "_tracking", "_frame")
     STATE = (
         "_lookahead",
         "_path_map",
@@ -156,6 +167,7 @@ class LocalPlanner(SavedAttributes, Node):
         )
         radius = float(self.declare_parameter("separation_m", 2.0, min_value=0.0).value)
         self._separation = Separation(radius_m=radius)
+        self._tracking = TrackingError()
         self._planning = RecedingHorizonPlanner(self._policy())
         self._frame = MapFrame()
         self._frame_was: Any = None
@@ -232,7 +244,6 @@ class LocalPlanner(SavedAttributes, Node):
             return
         height = self._sight.height_above_ground(pose, now)
         present = PrimitiveState(pose.position, pose.velocity, np.zeros(3))
-        self._planning.policy = self._policy()
         then = now + self._start_delay_ns
         if self._paused:
             self._planning.forget()
@@ -245,12 +256,20 @@ class LocalPlanner(SavedAttributes, Node):
         if self._path_map is None and not self._plans:
             self._publish_status("waiting", ["no path", *problems])
             return
+        self._measure_tracking(pose, now)
+        self._planning.policy = self._policy()
         start = self._planning.start(present, pose.yaw, now, then)
         if problems or self._lookahead_here() is None:
             self._publish(self._planning.hold(start, then), then)
             self._publish_status("holding", problems)
             return
         self._plan(pose, start, now, then)
+
+    def _measure_tracking(self, pose: OdometrySample, now: int) -> None:
+        planned = self._planning.state_at(now)
+        if planned is not None:
+            here = pose.position + pose.velocity * max((now - pose.time_ns) / NS_PER_S, 0.0)
+            self._tracking.add(norm((planned.position - here)[:2]), now)
 
     def _plan(self, pose: OdometrySample, start: PrimitiveState, now: int, then: int) -> None:
         lookahead = self._lookahead_here()
@@ -269,7 +288,7 @@ class LocalPlanner(SavedAttributes, Node):
         path = self._planning.plan(start, lookahead_point, sight, then)
         self._plans += 1
         self._publish(path, self._planning.began_ns)
-        self._publish_status(str(self._planning.doing), self._sight.warnings())
+        self._publish_status(str(self._planning.doing), self._warnings())
 
     def _lookahead_here(self) -> PathLookahead | None:
         """Returns the path in the odometry frame; recomputes it if that frame has moved."""
@@ -282,9 +301,21 @@ class LocalPlanner(SavedAttributes, Node):
             self._frame_was = at
         return self._lookahead
 
+    def _warnings(self) -> list[str]:
+        """Returns what makes the flight slower or less certain, as text."""
+        is_disturbed = self._tracking.margin_m > _DISTURBED_M
+        return self._sight.warnings() + ([PUSHED] if is_disturbed else [])
+
     def _policy(self) -> PlannerSettings:
-        limits = MotionLimits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
-        return PlannerSettings(limits, radius_m=self._radius, avoid_unknown=self._avoid_unknown)
+        margin = self._tracking.margin_m
+        speed = float(self._speed.value) * max(_MIN_SPEED, 1.0 - margin / _STOPPING_M)
+        radius = max(self._radius, min(self._radius + margin, _MAX_RADIUS_M))
+        return PlannerSettings(
+            MotionLimits(speed, self._acceleration, 1.5, 1.5, 1.4),
+            radius_m=radius,
+            soft_m=max(PlannerSettings.soft_m, radius + _SOFT_M),
+            avoid_unknown=self._avoid_unknown,
+        )
 
     # ---------------------------------------------------------------------------------- publishers
 
@@ -299,6 +330,7 @@ class LocalPlanner(SavedAttributes, Node):
         )
         clearance = self._planning.min_clearance_m if state == PlannerState.FLYING else None
         status = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
+        status["off_m"] = round(self._tracking.largest_m, 2)
         if clearance is not None:
             status["clearance_m"] = round(clearance, 2)
         now = self.get_clock().now_ns()

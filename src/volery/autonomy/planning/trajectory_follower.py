@@ -56,7 +56,7 @@ class TrajectoryFollower(SavedAttributes, Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("follower", **options)
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._gain = float(self.declare_parameter("gain", 1.2, min_value=0.0).value)
+        self._gain = float(self.declare_parameter("gain", 2.0, min_value=0.0).value)
         self._lookahead_ns = ns_from_s(
             float(self.declare_parameter("lookahead_s", 0.25, min_value=0.0, max_value=10.0).value)
         )
