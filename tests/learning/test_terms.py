@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.core import rng, rotations
-from volery.core.errors import ScenarioError
+from volery.core.errors import CommandError, ScenarioError
 from volery.learning.actions import AttitudeThrust, Choices, Position, RatesThrust, Velocity
 from volery.learning.draws import Draws
 from volery.learning.episodes import Episodes
@@ -91,6 +91,20 @@ def test_vectors_are_turned_into_the_frames_of_their_names(fly):
     np.testing.assert_allclose(flight.to_heading(north)[:, 0], [[2.0, 0.0, 0.0]] * 2, atol=1e-12)
     body = flight.to_body(north)[:, 0]
     np.testing.assert_allclose(body, [[2 * np.cos(0.3), 0.0, 2 * np.sin(0.3)]] * 2, atol=1e-12)
+    episodes.close()
+
+
+def test_a_state_of_an_earlier_decision_is_not_read_later():
+    episodes = Episodes(load_task("hover"), 2, threads=2)
+    episodes.begin(np.arange(2))
+    state = episodes.flight.state
+    before = state.position_map.copy()
+    episodes.decide(np.zeros((2, 1, 4)))
+    np.testing.assert_array_equal(state.position_map, before)
+    with pytest.raises(CommandError, match="velocity_map was not read before the next step"):
+        _ = state.velocity_map
+    with pytest.raises(AttributeError, match="no field 'speed'"):
+        _ = episodes.flight.state.speed
     episodes.close()
 
 

@@ -75,21 +75,17 @@ class Scheduler(Generic[What]):
         step, _, first = self._heap[0]
         if first.wanted is None or first.wanted():
             return step
+        return self.next_step_of(None)
+
+    def next_step_of(self, chosen: Callable[[What], bool] | None) -> int | None:
+        """Returns the step of the next firing of the chosen entries (None: all), None without."""
         nearest = None
         for step, _, entry in self._heap:
             is_nearer = nearest is None or step < nearest
-            if is_nearer and (entry.wanted is None or entry.wanted()):
+            is_wanted = entry.wanted is None or entry.wanted()
+            if is_nearer and is_wanted and (chosen is None or chosen(entry.what)):
                 nearest = step
         return nearest
-
-    def next_step_of(self, chosen: Callable[[What], bool]) -> int | None:
-        """Returns the step of the next firing of the chosen entries, None without one."""
-        steps = (
-            step
-            for step, _, entry in self._heap
-            if chosen(entry.what) and (entry.wanted is None or entry.wanted())
-        )
-        return min(steps, default=None)
 
     def pop_due(self, step: int) -> list[DueTask[What]]:
         """Returns all firings due at or before `step`, in order, and schedules the next ones."""

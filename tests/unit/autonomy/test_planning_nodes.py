@@ -122,8 +122,10 @@ def test_a_uav_that_is_pushed_off_its_plans_keeps_more_distance_at_less_speed():
     off_m = last_status(glade.status)["off_m"]
     assert off_m > 0.4
     assert pushed.radius_m == pytest.approx(min(0.6 + 1.5 * (off_m - 0.3), 1.5), abs=0.05)
-    assert pushed.soft_m >= pushed.radius_m + 0.8
+    assert pushed.soft_m - calm.soft_m == pytest.approx(pushed.radius_m - calm.radius_m)
     assert pushed.limits.speed < 2.9
+    glade.go_on(1.0, odom=False)
+    assert glade.node._tracking.largest_m <= off_m  # an old pose says nothing
 
 
 def test_deviations_are_forgotten_in_calm_air():

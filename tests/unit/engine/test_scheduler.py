@@ -50,3 +50,16 @@ def test_an_entry_added_late_does_not_fire_for_the_past():
     agenda.add("timer", Schedule.from_hz(100.0), after_step=25)
     assert agenda.next_step() == 30
     assert Scheduler(MS).next_step() is None
+
+
+def test_firings_that_are_not_wanted_are_skipped_and_end_no_tick():
+    agenda, wanted = Scheduler(MS), []
+    agenda.add("camera", Schedule.from_hz(200.0), after_step=0, wanted=lambda: bool(wanted))
+    agenda.add("imu", Schedule.from_hz(100.0), after_step=0)
+    agenda.add("lidar", Schedule.from_hz(40.0), after_step=0)
+    assert agenda.next_step() == 10
+    assert agenda.next_step_of(lambda what: what != "imu") == 25
+    assert [due.what for due in agenda.pop_due(10)] == ["imu"]
+    wanted.append(True)
+    assert agenda.next_step() == 15
+    assert [(due.what, due.k) for due in agenda.pop_due(15)] == [("camera", 3)]

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
 from volery.core.compiled import kernel
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.graph.messages import LaserScan, Odometry
 
+_EXTRAPOLATED_S = 0.1
+"""Longest extrapolation of a pose by its velocity: stamps of another clock may be wrong."""
 _NEAREST_M = 0.45
 """Min range; nearer returns are from the vehicle itself, or noise."""
 
@@ -43,6 +46,11 @@ class OdometrySample:
             rotations.rotate(attitude, [v.x, v.y, v.z]),
             np.array([w.x, w.y, w.z]),
         )
+
+    def position_at(self, now_ns: int) -> Array:
+        """Returns the position (3,) m a moment later, extrapolated by the velocity."""
+        age_s = min(max((now_ns - self.time_ns) / NS_PER_S, 0.0), _EXTRAPOLATED_S)
+        return self.position + self.velocity * age_s
 
     @property
     def yaw(self) -> float:

@@ -89,11 +89,9 @@ _STOPPING_M, _MIN_SPEED = 1.5, 0.3
 """Margin for disturbances at which the speed would be zero, m; smallest fraction of it."""
 _MAX_RADIUS_M = 1.5
 """Largest radius with its margin, m: distances are measured up to 1.75 m."""
-_SOFT_M = 0.8
-"""Distance beyond the radius in which obstacles add cost, m."""
-PUSHED = "the UAV is pushed off its plans: it flies slower, farther from obstacles"
 _DISTURBED_M = 0.2
 """Margin for disturbances from which the status mentions it, m."""
+PUSHED = "the UAV is pushed off its plans: it flies slower, farther from obstacles"
 _STATUS_PERIOD_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
 
@@ -102,8 +100,9 @@ class LocalPlanner(SavedAttributes, Node):
     """Follows `planning/path` by `planning/trajectory`; publishes `planning/status`.
 
     An empty path makes the UAV hold. The status is JSON: state (waiting, holding, flying, turning,
-    blocked, arrived, paused), problems, left_m, clearance_m, plans. `planning/pause`
-    (std_msgs/Bool, true) stops planning and clears the path.
+    blocked, arrived, paused), problems, left_m, clearance_m, plans, off_m (largest deviation from
+    plans of the last half minute). `planning/pause` (std_msgs/Bool, true) stops planning and clears
+    the path.
 
     Parameters
     ----------
@@ -111,7 +110,8 @@ class LocalPlanner(SavedAttributes, Node):
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
     height_m: height above ground to fly at; speed_m_s: max speed. Both may be set in flight.
     acceleration_m_s2: max horizontal acceleration.
-    safe_radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
+    safe_radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s,
+        and more if disturbances push the UAV off its plans.
     avoid_unknown: whether plans avoid unknown space.
     period_s: time between plans. start_delay_s: time from a plan's input to its start; not less
         than the node's latency.
@@ -256,7 +256,8 @@ class LocalPlanner(SavedAttributes, Node):
         if self._path_map is None and not self._plans:
             self._publish_status("waiting", ["no path", *problems])
             return
-        self._measure_tracking(pose, now)
+        if not problems:
+            self._measure_tracking(pose, now)
         self._planning.policy = self._policy()
         start = self._planning.start(present, pose.yaw, now, then)
         if problems or self._lookahead_here() is None:
@@ -268,8 +269,8 @@ class LocalPlanner(SavedAttributes, Node):
     def _measure_tracking(self, pose: OdometrySample, now: int) -> None:
         planned = self._planning.state_at(now)
         if planned is not None:
-            here = pose.position + pose.velocity * max((now - pose.time_ns) / NS_PER_S, 0.0)
-            self._tracking.add(norm((planned.position - here)[:2]), now)
+            off = planned.position - pose.position_at(now)
+            self._tracking.add(norm(off[:2]), now)
 
     def _plan(self, pose: OdometrySample, start: PrimitiveState, now: int, then: int) -> None:
         lookahead = self._lookahead_here()
@@ -313,7 +314,7 @@ class LocalPlanner(SavedAttributes, Node):
         return PlannerSettings(
             MotionLimits(speed, self._acceleration, 1.5, 1.5, 1.4),
             radius_m=radius,
-            soft_m=max(PlannerSettings.soft_m, radius + _SOFT_M),
+            soft_m=PlannerSettings.soft_m + radius - self._radius,
             avoid_unknown=self._avoid_unknown,
         )
 

@@ -28,8 +28,6 @@ from volery.graph.nodes.node import Node
 _PERIOD_S = 0.04
 _STALE_S = 0.5
 """Time without odometry after which the follower commands zero velocity."""
-_CARRIED_S = 0.1
-"""Longest extrapolation of a pose by its velocity: stamps of another clock may be wrong."""
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
 """Distance from the plan beyond which the follower stops and waits for another plan."""
@@ -118,11 +116,9 @@ class TrajectoryFollower(SavedAttributes, Node):
         self._fly(self._plan, self._pose, now)
 
     def _fly(self, plan: TrajectorySamples, pose: OdometrySample, now: int) -> None:
-        age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
-        here = pose.position + pose.velocity * age_s
         setpoint, _ = plan.at(now)
         _, velocity = plan.at(now + self._lookahead_ns)
-        off = setpoint - here
+        off = setpoint - pose.position_at(now)
         if norm(off) > _OFF_M:
             self._publish_status("stopped", "too far from the plan")
             velocity, off = np.zeros(3), np.zeros(3)
