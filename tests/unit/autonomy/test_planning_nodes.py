@@ -119,9 +119,9 @@ def test_a_uav_that_is_pushed_off_its_plans_keeps_more_distance_at_less_speed():
     glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
     glade.go_on(4.0)  # the bench's UAV does not move
     pushed = glade.node._policy()
-    off_m = last_status(glade.status)["off_m"]
-    assert off_m > 0.4
-    assert pushed.radius_m == pytest.approx(min(0.6 + 1.5 * (off_m - 0.3), 1.5), abs=0.05)
+    off_m = glade.node._tracking.largest_m
+    assert last_status(glade.status)["off_m"] > 0.4
+    assert pushed.radius_m == pytest.approx(min(0.6 + 1.5 * (off_m - 0.3), 1.5))
     assert pushed.soft_m - calm.soft_m == pytest.approx(pushed.radius_m - calm.radius_m)
     assert pushed.limits.speed < 2.9
     glade.go_on(1.0, odom=False)
@@ -140,6 +140,15 @@ def test_deviations_are_forgotten_in_calm_air():
     for k in range(131, 200):
         tracking.add(0.1, k * S)
     assert tracking.margin_m == 0.0
+
+
+def test_deviations_by_wrong_odometry_are_retracted():
+    tracking = TrackingError()
+    for k in range(40):
+        tracking.add(0.4 if k < 20 else 2.0, k * S // 20)  # s 1 to 2 are wrong
+    assert tracking.largest_m == 2.0
+    tracking.retract()
+    assert 0.35 < tracking.largest_m < 0.4
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,7 @@ class LocalPlanner(SavedAttributes, Node):
         "_plans",
         "_frame_was",
         "_paused",
+        "_is_faulty",
     )
 
     WARMUP_TASKS = (
@@ -168,6 +169,8 @@ class LocalPlanner(SavedAttributes, Node):
         radius = float(self.declare_parameter("separation_m", 2.0, min_value=0.0).value)
         self._separation = Separation(radius_m=radius)
         self._tracking = TrackingError()
+        self._is_faulty = False
+        """Whether inputs were missing or wrong at the last tick."""
         self._planning = RecedingHorizonPlanner(self._policy())
         self._frame = MapFrame()
         self._frame_was: Any = None
@@ -256,8 +259,13 @@ class LocalPlanner(SavedAttributes, Node):
         if self._path_map is None and not self._plans:
             self._publish_status("waiting", ["no path", *problems])
             return
-        if not problems:
+        if problems:
+            self._tracking.retract()
+        elif self._is_faulty:
+            self._planning.forget()  # what moved the vehicle meanwhile is no deviation from a plan
+        else:
             self._measure_tracking(pose, now)
+        self._is_faulty = bool(problems)
         self._planning.policy = self._policy()
         start = self._planning.start(present, pose.yaw, now, then)
         if problems or self._lookahead_here() is None:
