@@ -10,7 +10,6 @@ from volery.learning.transfer import fly_transfer
 from volery_benchmarks.registry import Measured
 
 _EPISODES = 200
-_TRANSFER_EPISODES = 50
 _FLOWN_BY = {"hover": "late_hover"}
 """Policies of tasks whose own one is trained without latency, which the full simulation has."""
 
@@ -35,7 +34,7 @@ def measure_transfer() -> Measured:
             continue
         try:
             policy = _FLOWN_BY.get(name, name)
-            found = fly_transfer(policy, load_task(name), episodes=_TRANSFER_EPISODES)
+            found = fly_transfer(policy, load_task(name), episodes=_EPISODES)
         except VoleryError as error:
             failures[f"transfer_{name}"] = str(error)
             continue

@@ -79,6 +79,15 @@ def multiply_rows(p: Array, q: Array, out: Array) -> None:
 
 
 @brief_kernel
+def matrices(q: Array, out: Array) -> None:
+    """Writes the rotation matrices of rows of `q` (K, 4) into `out` (K, 3, 3)."""
+    for k in range(len(out)):
+        rows = matrix_rows(q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+        for i in range(3):
+            out[k, i, 0], out[k, i, 1], out[k, i, 2] = rows[i]
+
+
+@brief_kernel
 def moved_points(points: Array, attitude: Array, position: Array) -> Array:
     """Rotates points (K, 3) by `attitude` (4,) and shifts them by `position` (3,)."""
     x, y, z, w = attitude[0], attitude[1], attitude[2], attitude[3]

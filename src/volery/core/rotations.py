@@ -110,13 +110,21 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
 
 def matrix(q: ArrayLike) -> Array:
     """Returns the rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    x, y, z, w = _components(q)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    q = np.asarray(q, np.float64)
+    if q.ndim > 1:
+        from volery.core.rotation_kernels import matrices  # numba, which starts slowly
+
+        out = np.empty((*q.shape[:-1], 3, 3))
+        matrices(_rows(q), out.reshape(-1, 3, 3))
+        return out
+    x, y, z, w = q.tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:

@@ -28,8 +28,8 @@ def to_heading(attitude: ArrayLike, vectors_map: ArrayLike) -> Array:
 
 def rotation_rows(attitude: ArrayLike) -> Array:
     """Returns rotation matrices, map from body, row by row (..., 9)."""
-    columns = rotations.rotate(np.asarray(attitude)[..., None, :], np.eye(3))
-    return np.swapaxes(columns, -1, -2).reshape(*columns.shape[:-2], 9)
+    matrices = rotations.matrix(attitude)
+    return matrices.reshape(*matrices.shape[:-2], 9)
 
 
 def scaled(numbers: ArrayLike, scale: float, limit: float) -> Array:
