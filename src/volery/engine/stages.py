@@ -50,8 +50,10 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
         fleet.advance(
             last - fleet.step, engine.terrain, event_ends=event_ends, workers=engine.scene.workers
         )
-        ends = fleet.has_events and event_ends
-        if not tick.fuses or ends or not engine.collisions.refill():
+        if not event_ends:
+            if fleet.step < last:  # the contacts of the last step have a stage of their own
+                engine.collisions.resolve(engine.time_ns)
+        elif not tick.fuses or fleet.has_events or not engine.collisions.refill():
             break
     if fleet.step > first:
         engine.turn = 0
