@@ -66,6 +66,7 @@ VIEWS = {
     "servoing": CardView(2.3, (-1.5, -1.0, 1.4), 65.0),
     "swarm_100": CardView(8.0, (-0.5, -0.35, 0.12), 75.0),
     "v_formation": CardView(45.0, (-9.0, -7.0, 8.0), 80.0),
+    "v_formation_distributed": CardView(90.0, (-12.0, -10.0, 9.0), 80.0),
 }
 
 
@@ -102,7 +103,8 @@ def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
     if view.hour_of_day is not None:
         data["world"]["light"]["hour_of_day"] = view.hour_of_day
     names = [f"uav{k + 1}" for k in range(scenario.uav_count)]
-    for node in data.get("nodes", ()):  # their teams are without the photographer
+    of_types = [node for kind in data["types"].values() for node in kind.get("nodes", ())]
+    for node in [*data.get("nodes", ()), *of_types]:  # their teams are without the photographer
         own = node.get("parameters", {})
         node["parameters"] = {k: names if v == "{uavs}" else v for k, v in own.items()}
     first = scenario.uavs[0].position_m

@@ -354,10 +354,11 @@ BENCHES: dict[str, Bench] = {
             "swarm",
             "Swarm: plans that lead seven birds from random starts into a V; CPU time of a plan "
             "(ARES, TACAS 2017: 95 % of 8,000 starts, 63 s); flights of seven F450s into a V, and "
-            "into a new one after one or two have landed; `games_...`: games that the search wins "
-            "against an attacker; crowds of 30 to 100 F450s by four behaviours: `..._collisions`: "
-            "runs in which a UAV touches something, `..._arrived`: share of runs in which all "
-            "others arrive within 150 s; 100 runs by ORCA and trajectories, 10 by others; flocks "
+            "into a new one after one or two have landed; `dampc_...`: birds without a leader, and "
+            "flights by radio; `games_...`: games that the search wins against an attacker; crowds "
+            "of 30 to 100 F450s by four behaviours: `..._collisions`: runs in which a UAV touches "
+            "something, `..._arrived`: share of runs in which all others arrive within 150 s; 100 "
+            "runs by ORCA and trajectories, 10 by others; flocks "
             "with contacts and downwash at 1 kHz, 1,000 UAVs and the largest number in real time",
             {
                 "ares_success": Bound(0.97),

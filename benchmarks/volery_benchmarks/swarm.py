@@ -19,7 +19,7 @@ import numpy as np
 from volery.autonomy.swarm.formation_search import plan_formation
 from volery.core.arrays import Array
 from volery.core.machine import usable_cores
-from volery_benchmarks import crowds, formation_games
+from volery_benchmarks import crowds, distributed_formation, formation_games
 from volery_benchmarks.formation_flight import fly
 from volery_benchmarks.large_swarms import measure_real_time
 from volery_benchmarks.registry import chosen_parts
@@ -84,6 +84,28 @@ def _flights(quick: bool) -> dict[str, float]:
     return figures
 
 
+def _distributed(quick: bool) -> dict[str, float]:
+    """Returns the figures of birds without a leader, and of flights in which one is lost."""
+    seeds = range(1, 1 + (_QUICK_STARTS if quick else _STARTS))
+    distributed_formation.plan(*_start(0), 0)  # compiles
+    steps, seconds = zip(*(distributed_formation.plan(*_start(k), k) for k in seeds), strict=True)
+    count = _QUICK_FLIGHTS if quick else _FLIGHTS
+    flights = [distributed_formation.fly(seed, _BIRDS, 1) for seed in range(1, count + 1)]
+    times = [flight.time_to_v_s for flight in flights]
+    recoveries = [flight.recovery_s for flight in flights]
+    return {
+        "dampc_success": sum(step is not None for step in steps) / len(steps),
+        "dampc_steps_median": float(statistics.median(step for step in steps if step is not None)),
+        "dampc_s_mean": statistics.fmean(seconds),
+        "dampc_time_to_v_s": float(np.nanmedian(times)),
+        "dampc_v_success": float(np.isfinite(times).mean()),
+        "dampc_recovery_s_one_lost": float(np.nanmedian(recoveries)),
+        "dampc_recovery_success_one_lost": float(np.isfinite(recoveries).mean()),
+        "dampc_least_distance_m": min(flight.min_distance_m for flight in flights),
+        "dampc_real_time_factor": statistics.median(f.real_time_factor for f in flights),
+    }
+
+
 def _games(quick: bool) -> dict[str, float]:
     """Returns the shares of games that the search wins against an attacker."""
     return formation_games.play(_QUICK_GAMES if quick else _GAMES)
@@ -110,6 +132,7 @@ PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
     "plans": _plans,
     "flights": _flights,
     "games": _games,
+    "distributed": _distributed,
     "scale": measure_real_time,
     **{situation: partial(_crowd, situation) for situation in crowds.SITUATIONS},
 }

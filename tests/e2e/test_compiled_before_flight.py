@@ -44,6 +44,7 @@ _REASON = "a `warmup_tasks` of a node, or `runtime.warmup`, lacks what compiles 
 def test_nothing_is_compiled_in_flight() -> None:
     """The search flies until it has closed loops and planned new paths."""
     flights = (("forest_search", 70), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
+    flights += (("v_formation_distributed", 40),)
     received: dict[str, dict[str, str]] = {}
     for scenario, seconds in flights:
         printed = _run("-c", _FLY, scenario, str(seconds))

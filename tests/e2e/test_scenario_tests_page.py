@@ -87,8 +87,16 @@ def test_flights_that_fail_leave_what_is_uploaded(steps, checkout):
     assert {".xml", ".mcap", ".png"} <= kinds
 
 
-def test_functions_of_the_document_judge_its_flight(checkout, monkeypatch):
-    monkeypatch.delitem(sys.modules, "own_checks", raising=False)
+@pytest.fixture(name="own_checks")
+def _own_checks():
+    """The module of this name is imported anew, and forgotten."""
+    sys.modules.pop("own_checks", None)
+    yield
+    sys.modules.pop("own_checks", None)
+
+
+@pytest.mark.usefixtures("own_checks")
+def test_functions_of_the_document_judge_its_flight(checkout):
     expectations = re.findall(
         r'^```toml\n(\[\[expect\]\]\nkind = "predicate"\n.*?)^```', PAGE, re.DOTALL | re.M
     )

@@ -13,6 +13,7 @@ import pytest
 
 FLIGHTS = {
     "v_formation": 45.0,
+    "v_formation_distributed": 30.0,
     "flock": 12.0,
     "forest_search": 4.0,
     "cooperative_search": 5.0,

@@ -60,6 +60,7 @@ NODES = {
     "policy": {"goal": [3.0, 1.0, 4.0]},
     "flock": {"uavs": ["uav1", "uav2"], "waypoints_m": [[3.0, 1.0]]},
     "v_formation": {"uavs": ["uav1", "uav2"]},
+    "formation_member": {"uavs": ["uav1", "uav2"]},
     "pursuit": {"pursuers": ["uav2"], "uavs": ["uav1"]},
 }
 """Nodes and their parameters."""

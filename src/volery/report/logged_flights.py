@@ -18,7 +18,7 @@ from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
-from volery.report.logged_teams import FLOCK, FORMATION, EnergyMeter, LoggedTeam, TeamLog
+from volery.report.logged_teams import FLOCK, FORMATION, MEMBER, EnergyMeter, LoggedTeam, TeamLog
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.verdicts.observing import ESTIMATES
@@ -135,7 +135,7 @@ class _Log:
         elif kind == _BATTERY_TYPE and what == "battery":
             meter = self.batteries.setdefault(name, EnergyMeter())
             meter.add(time_ns, decoder.decode(record).message)
-        elif topic in (FORMATION, FLOCK):
+        elif topic in (FORMATION, FLOCK) or what == MEMBER:
             self.team.add(topic, time_ns, decoder.decode(record).message)
         elif topic == "/tf_static":
             self.joints.add(decoder.decode(record).message)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.autonomy.swarm.formation_member import MemberPhase
 from volery.autonomy.swarm.orca import OrcaSettings
 from volery.autonomy.swarm.v_formation import (
     LOST_COST,
@@ -21,12 +22,14 @@ from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 
 FORMATION, FLOCK = "/v_formation/status", "/flock/status"
+MEMBER = "formation_member/status"
+"""Topic, below a UAV's namespace, of the status of a formation that no node leads."""
 _NUMBERS = {
     FORMATION: ("cost", "velocity_matching", "clear_view", "upwash", "searches", "time_to_v_s"),
     FLOCK: ("order", "arrived", "members"),
 }
 """Numbers of a status that are drawn, by topic."""
-_PHASES = [str(phase) for phase in VFormationPhase]
+_PHASES = [str(phase) for phase in (*VFormationPhase, *MemberPhase)]
 _SENSIBLE = 1e6
 """Larger numbers are drawn as this one."""
 _LONGEST_GAP_S = 5.0
@@ -38,7 +41,7 @@ class LoggedTeam:
     """What the node of a team published, K times."""
 
     topic: str
-    """`FORMATION` or `FLOCK`."""
+    """`FORMATION`, also of a UAV's own status of one, or `FLOCK`."""
     time_s: Array
     """(K,) s, of the log."""
     numbers: Mapping[str, Array]
@@ -91,6 +94,7 @@ class TeamLog:
     """Collects the statuses of one team from a log; the first topic with one is taken."""
 
     topic: str = ""
+    """Topic of the statuses."""
     _rows: list[tuple[float, ...]] = field(default_factory=list)
     _phases: list[str] = field(default_factory=list)
     _members: list[frozenset[str]] = field(default_factory=list)
@@ -101,7 +105,7 @@ class TeamLog:
             return
         try:
             status = json.loads(message.data)
-            numbers = tuple(_number(status.get(key)) for key in _NUMBERS[topic])
+            numbers = tuple(_number(status.get(key)) for key in _NUMBERS[_kind(topic)])
         except (AttributeError, ValueError, TypeError, RecursionError):
             return
         self.topic = topic
@@ -115,10 +119,11 @@ class TeamLog:
         if not self._rows:
             return None
         table = np.array(self._rows)
-        numbers = dict(zip(_NUMBERS[self.topic], table[:, 1:].T, strict=True))
-        parameters = _parameters(self.topic.split("/")[1], scenario)
-        bounds = (math.nan, math.nan) if parameters is None else _bounds(self.topic, parameters)
-        return LoggedTeam(self.topic, table[:, 0], numbers, self._phases, self._members, *bounds)
+        kind = _kind(self.topic)
+        numbers = dict(zip(_NUMBERS[kind], table[:, 1:].T, strict=True))
+        parameters = _parameters(self.topic.split("/")[-2], scenario)
+        bounds = (math.nan, math.nan) if parameters is None else _bounds(kind, parameters)
+        return LoggedTeam(kind, table[:, 0], numbers, self._phases, self._members, *bounds)
 
 
 @dataclass
@@ -140,6 +145,11 @@ class EnergyMeter:
         self._last = now_s, power
 
 
+def _kind(topic: str) -> str:
+    """Returns the topic of which a status is of the kind."""
+    return FORMATION if topic.endswith(MEMBER) else topic
+
+
 def _number(value: Any) -> float:
     """Returns a number of a status within sensible limits; NaN if it is none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -149,11 +159,13 @@ def _number(value: Any) -> float:
 
 def _parameters(node: str, scenario: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """Returns the parameters of a node of a recorded scenario, which may hold anything."""
-    nodes = scenario.get("nodes")
-    for each in nodes if isinstance(nodes, list) else ():
-        if isinstance(each, dict) and each.get("node") == node:
-            parameters = each.get("parameters", {})
-            return parameters if isinstance(parameters, dict) else None
+    types = scenario.get("types")
+    parts = [scenario, *(types.values() if isinstance(types, dict) else ())]
+    for nodes in (part.get("nodes") for part in parts if isinstance(part, dict)):
+        for each in nodes if isinstance(nodes, list) else ():
+            if isinstance(each, dict) and each.get("node") == node:
+                parameters = each.get("parameters", {})
+                return parameters if isinstance(parameters, dict) else None
     return None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import textwrap
 
 import pytest
@@ -128,7 +129,9 @@ def written(tmp_path):
         function = "own_checks:high"
         """)
     )
-    return path
+    sys.modules.pop("own_checks", None)
+    yield path
+    sys.modules.pop("own_checks", None)
 
 
 def test_a_trusted_file_runs_code_beside_it(written):

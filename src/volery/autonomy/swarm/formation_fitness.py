@@ -96,6 +96,16 @@ def fitness_cost(flock: Any) -> float:
     return cost
 
 
+@kernel
+def upwash_of(flock: Any, i: int) -> float:
+    """Returns the benefit, at most 1, that bird i of a flock (4, N) has of the others."""
+    benefit = 0.0
+    for j in range(flock.shape[1]):
+        if j != i:
+            benefit += seen_by(flock, i, j)[1]
+    return min(1.0, benefit)
+
+
 @inner_kernel
 def cost_of(count: int, matching: float, view: float, upwash: float) -> float:
     """Returns the cost of a flock of `count` birds by the parts of its fitness."""

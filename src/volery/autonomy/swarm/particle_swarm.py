@@ -40,6 +40,21 @@ class FlockLimits(NamedTuple):
     """Maximum change of a velocity in a step, wing spans per step; at most a bird's speed."""
 
 
+def vehicle_limits(
+    min_distance: float,
+    max_speed_m_s: float,
+    max_acceleration_m_s2: float,
+    wing_span_m: float,
+    step_s: float,
+) -> FlockLimits:
+    """Returns the limits of birds whose steps vehicles can follow; min_distance in wing spans."""
+    return FlockLimits(
+        min_distance,
+        max_speed_m_s * step_s / wing_span_m,
+        max_acceleration_m_s2 * step_s**2 / wing_span_m,
+    )
+
+
 class _Flock(NamedTuple):
     """A flock of N birds after a look-ahead, and what each means to each other one."""
 
@@ -122,6 +137,36 @@ def best_accelerations(
     min_distance = limits.min_distance
     is_near = min_distance > 0.0 and approach_margin(start, flock.moved, min_distance) < 0.0
     return math.inf if is_near else fitness_cost(flock.moved), counter
+
+
+@kernel
+def best_acceleration(
+    start: Any,
+    i: int,
+    horizon: int,
+    num_particles: int,
+    limits: FlockLimits,
+    key: np.uint64,
+    counter: int,
+    best: Any,
+) -> tuple[float, int]:
+    """Searches the acceleration of bird i alone, while the others fly straight.
+
+    best: (2,), receives size and direction (rad). The other arguments and results are those of
+    `best_accelerations`; the cost is infinite where each acceleration comes too near to another.
+    """
+    count = start.shape[1]
+    flock, swarm = _new_flock(count), _new_swarm(num_particles)
+    for j in range(count):
+        accelerate(start, j, 0.0, 0.0, horizon, limits.max_speed, flock.moved)
+    for j in range(count):
+        _compare(flock, j)
+    found = np.zeros((2, count))
+    cost, counter = _search(
+        start, i, horizon, limits, flock, swarm, np.empty(count), key, counter, found
+    )
+    best[0], best[1] = found[0, i], found[1, i]
+    return cost, counter
 
 
 @owning_kernel

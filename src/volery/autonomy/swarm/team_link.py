@@ -41,6 +41,11 @@ def number(node: Node, name: str, default: float, minimum: float, maximum: float
     return float(parameter.value)
 
 
+def limited(velocity: Array, speed: float) -> Array:
+    """Returns a velocity (2,) of at most a speed."""
+    return velocity * min(1.0, speed / max(float(np.hypot(*velocity)), 1e-9))
+
+
 class TeamLink(SavedAttributes):
     """Connects a node with N UAVs; a part of its state.
 

@@ -18,8 +18,9 @@ from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
 from volery.autonomy.swarm.formation_search import FormationSearch
 from volery.autonomy.swarm.orca import Orca, OrcaSettings
-from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
-from volery.autonomy.swarm.team_link import TeamLink, number
+from volery.autonomy.swarm.particle_swarm import approach_margin, vehicle_limits
+from volery.autonomy.swarm.random_start import random_start
+from volery.autonomy.swarm.team_link import TeamLink, limited, number
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
@@ -33,27 +34,22 @@ MIN_DISTANCE = 1.0
 LOST_COST = 0.1
 """Default of the parameter `lost_cost`."""
 _PERIOD_S = 0.05
-_GAIN = 0.8
+GAIN = 0.8
 """Velocity per distance from the bird, 1/s."""
-_OVERSPEED = 1.5
+OVERSPEED = 1.5
 """Limit of commanded speeds, in speeds of a plan: UAVs catch up with their birds."""
-_NEAR_M = 0.4
-_MAX_OFFSET = 1.5
+NEAR_M = 0.4
+"""Distance at which a UAV has arrived at its start position."""
+MAX_OFFSET = 1.5
 """Distance from its bird, in wing spans, at which a UAV counts as displaced."""
-_GATHER_APART = 0.7
+GATHER_APART = 0.7
 """Distance that UAVs keep on their paths to the start positions, in wing spans."""
-_BOX = 3.0
-"""Side of the box of random starts of seven, wing spans, after ARES; larger teams are as dense."""
 _SEVEN = 7
-_SPEEDS = (0.25, 0.75)
-"""Random start velocities per axis, in wing spans per step, after ARES."""
-_DRAWS, _MAX_DRAWS = 1_000, 50_000
+_DRAWS = 1_000
 _MAX_LEAD = 8
 """Maximum steps that a search may last."""
 _MAX_KICKS = 10
 """Random changes of the velocities after searches in vain, until the best plan is flown."""
-_APART = 1.2
-"""Minimum distance of random starts, in wing spans."""
 
 
 class VFormationPhase(StrEnum):
@@ -123,14 +119,10 @@ class VFormation(SavedAttributes, Node):
         self._gathers = bool(self.declare_parameter("gathers", True).value)
         self._max_speed = max_speed = number(self, "max_speed_m_s", 4.0, 0.1, 100.0)
         acceleration = number(self, "max_acceleration_m_s2", 1.0, 0.01, 100.0)
-        limits = FlockLimits(
-            distance,
-            max_speed * self._duration_s / self._span,
-            acceleration * self._duration_s**2 / self._span,
-        )
+        limits = vehicle_limits(distance, max_speed, acceleration, self._span, self._duration_s)
         self._settings = AresSettings(limits=limits)
         self._avoidance = Orca(
-            OrcaSettings(distance_m=_GATHER_APART * self._span, max_speed_m_s=max_speed)
+            OrcaSettings(distance_m=GATHER_APART * self._span, max_speed_m_s=max_speed)
         )
 
         self.phase = VFormationPhase.ASCEND
@@ -184,33 +176,12 @@ class VFormation(SavedAttributes, Node):
         self._bird[:] = self._team.motion()[0]
         if self._gathers:
             middle = self._bird.mean(axis=0)
-            self._bird[:] = middle + self._span * self._drawn_start(self._bird - middle)
+            along = np.argsort(self._bird[:, 0], kind="stable")
+            start = random_start(len(along), self._seed)
+            self._bird[along] = middle + self._span * start.positions
             self.phase = VFormationPhase.GATHER
         else:
             self._set_off(now_ns)
-
-    def _drawn_start(self, offsets: Array) -> Array:
-        """Returns random positions (N, 2), wing spans, sorted so that the paths hardly cross."""
-        count = len(offsets)
-        rng = np.random.default_rng(self._seed)
-        side = (_BOX + _APART) * math.sqrt(max(1.0, count / _SEVEN)) - _APART
-        found: list[Array] = []
-        for draw in range(_MAX_DRAWS):
-            if draw % _DRAWS == 0:  # the first ones may leave no room
-                found = []
-            drawn = rng.uniform(-0.5 * side, 0.5 * side, 2)
-            if all(math.dist(drawn, other) >= _APART for other in found):
-                found.append(drawn)
-            if len(found) == count:
-                break
-        else:  # too dense: a grid
-            width = math.ceil(math.sqrt(count))
-            found = [np.array([k % width, k // width], float) * _APART for k in range(count)]
-        along = np.argsort(offsets[:, 0], kind="stable")
-        drawn = np.array(sorted(found, key=lambda position: float(position[0])))
-        placed = np.empty((count, 2))
-        placed[along] = drawn
-        return placed
 
     @property
     def _hovers(self) -> bool:
@@ -218,13 +189,12 @@ class VFormation(SavedAttributes, Node):
 
     def _has_gathered(self) -> bool:
         position, _ = self._team.motion()
-        return bool((np.abs(position - self._bird[self._team.members]) < _NEAR_M).all())
+        return bool((np.abs(position - self._bird[self._team.members]) < NEAR_M).all())
 
     def _set_off(self, now_ns: int) -> None:
         """Searches the first plan, with random velocities; the UAVs hover until it is found."""
-        rng = np.random.default_rng([self._seed, 1])
-        speed = rng.uniform(*_SPEEDS, self._velocity.shape)
-        self._velocity[:] = speed * self._span / self._duration_s
+        start = random_start(len(self._velocity), self._seed)
+        self._velocity[:] = start.velocities * self._span / self._duration_s
         self._num_kicks, self._lead = 0, 0
         self._begin_search(now_ns, "start")
 
@@ -331,7 +301,7 @@ class VFormation(SavedAttributes, Node):
         rows = np.array(self._team.members)
         position, _ = self._team.motion()
         offset = np.abs(position - self._bird[rows]).max(axis=1)
-        is_displaced = offset > _MAX_OFFSET * self._span
+        is_displaced = offset > MAX_OFFSET * self._span
         self._bird[rows[is_displaced]] = position[is_displaced]
         if lost or is_displaced.any():
             self._restart_search(now_ns, f"{lost} left" if lost else "a UAV was displaced")
@@ -342,15 +312,13 @@ class VFormation(SavedAttributes, Node):
         position, velocity = self._team.motion()
         is_still = self.phase is VFormationPhase.GATHER or self._hovers
         ahead = np.zeros((len(rows), 2)) if is_still else self._velocity[rows]
-        wanted = ahead + _GAIN * (self._bird[rows] - position)
+        wanted = ahead + GAIN * (self._bird[rows] - position)
         if self.phase is VFormationPhase.GATHER:
             flock = flock_within(position, velocity, self._avoidance.radius_m)
             wanted = self._avoidance.velocities(flock, wanted, Surroundings())
         for row, level in zip(rows, wanted, strict=True):
-            speed = float(np.hypot(*level))
             height = self._height + self._height_step * (row % 2)
-            part = min(1.0, _OVERSPEED * self._max_speed / max(speed, 1e-9))
-            self._team.command(row, part * level, height)
+            self._team.command(row, limited(level, OVERSPEED * self._max_speed), height)
 
     # ---------------------------------------------------------------------------------- status
 
@@ -364,10 +332,7 @@ class VFormation(SavedAttributes, Node):
         status = {
             "phase": str(self.phase),
             "members": [self._team.names[row] for row in self._team.members],
-            "cost": round(fitness.cost, 6),
-            "velocity_matching": round(fitness.velocity_matching, 6),
-            "clear_view": round(fitness.clear_view, 6),
-            "upwash": round(fitness.upwash, 6),
+            **{name: round(part, 6) for name, part in fitness._asdict().items()},
             "searches": self._num_searches,
             "reason": self._note,
             "time_to_v_s": None if self._solved_ns < 0 else self._solved_ns / NS_PER_S,

@@ -11,6 +11,7 @@ from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import formation_fitness
 from volery.autonomy.swarm.formation_search import plan_formation
 from volery.autonomy.swarm.joining import trajectory_into
+from volery.autonomy.swarm.member_planning import MemberPlanner
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.particle_swarm import FlockLimits, approach_margin
@@ -29,6 +30,16 @@ def formation_search() -> None:
     trajectory_into(start, start[:2], start[:2], others, FlockLimits(), np.uint64(1), 0, trajectory)
     flock = np.zeros((4, 3))
     approach_margin(flock, flock, 1.0)
+
+
+def member_planning() -> None:
+    """Compiles the planning of a bird that searches, settles and joins."""
+    planner = MemberPlanner(FlockLimits(1.0, 3.0, 1.0))
+    scattered = np.array([[0.0, 2.0, 4.0], [0.0, 1.0, 0.0], [0.5] * 3, [0.5] * 3])
+    formed = np.array([[0.0, 1.9, -1.9], [0.0, -1.0, -1.0], [0.0] * 3, [1.0] * 3])
+    for flock, joining in ((scattered, False), (formed, False), (scattered, True)):
+        planner.is_joining = joining
+        planner.velocity(flock, np.array([joining, False, False]), 0)
 
 
 def flocking() -> None:

@@ -52,7 +52,7 @@ def announce_sensors(
 START_POSE = "{start_pose}"
 """Placeholder in a node's parameters for the UAV's start pose: x, y, z, m, and yaw, rad."""
 UAV_NAMES = "{uavs}"
-"""Placeholder in the parameters of a node of the whole system for the names of all UAVs."""
+"""Placeholder in a node's parameters for the names of all UAVs."""
 
 
 def start_nodes(
@@ -70,7 +70,7 @@ def start_nodes(
             for k, entry in enumerate(scenario.types[start.type_name].nodes):
                 where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
                 context = _context(scenario, entry, graph, engine, now_ns)
-                own = _with_start(entry, start)
+                own = _filled(_with_start(entry, start), UAV_NAMES, list(engine.names))
                 node = start_node(own, context, f"/{start.name}", where, scenario.access)
                 started.add(node.destroy_node)
                 nodes.append(node)

@@ -121,6 +121,7 @@ def magnetic_fields() -> None:
 
 def estimates() -> None:
     """Compiles the UAVs' estimators."""
+    from volery.control.estimator.errors import twist_covariance
     from volery.control.estimator.estimator import Estimator
     from volery.control.estimator.settings import EstimatorSettings
 
@@ -129,7 +130,7 @@ def estimates() -> None:
     estimator = Estimator(2, EstimatorSettings(), position=still, velocity=still, attitude=level)
     estimator.fuse_pressure_height(rows, 1, np.zeros(2), 1.0)
     estimator.predict(rows, 5_000_000, still, up)
-    estimator.covariance(rows)
+    twist_covariance(estimator.covariance(rows), still, level, 0.0)
 
 
 def other_plants() -> None:
