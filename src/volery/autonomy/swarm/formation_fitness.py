@@ -66,7 +66,7 @@ def flock_of(positions: ArrayLike, velocities: ArrayLike) -> Array:
             f"positions and velocities of a flock are (N, 2) each, not {xy.shape} and "
             f"{speeds.shape}"
         )
-    flock: Array = np.concatenate((xy.T, speeds.T))
+    flock: Array = np.ascontiguousarray(np.concatenate((xy.T, speeds.T)))
     if not np.isfinite(flock).all():
         raise PlanError("a flock's positions and velocities must be finite")
     return flock

@@ -40,6 +40,7 @@ def member_planning() -> None:
     for flock, joining in ((scattered, False), (formed, False), (scattered, True)):
         planner.is_joining = joining
         planner.velocity(flock, np.array([joining, False, False]), 0)
+    formation_fitness(formed[:2].T, formed[2:].T)
 
 
 def flocking() -> None:
