@@ -15,6 +15,7 @@ from volery.autonomy.swarm.behaviour import (
     SwarmBehaviour,
     flock_within,
 )
+from volery.autonomy.swarm.hostile_uavs import HostileUavs
 from volery.autonomy.swarm.olfati_saber import OlfatiSaber
 from volery.autonomy.swarm.orca import Orca
 from volery.autonomy.swarm.team_link import TeamLink, number
@@ -75,11 +76,11 @@ class FlockNode(SavedAttributes, Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("flock", **options)
         named = self.declare_parameter("uavs", ["uav1", "uav2", "uav3"]).value
-        hostile = self.declare_parameter("hostile", []).value
-        names = [name for name in named if name not in hostile]
         self._behaviour = self._named_behaviour()
         odometry = str(self.declare_parameter("odometry", "odom").value)
         self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
+        self._hostile = HostileUavs(self, odometry, self._height)
+        names = [name for name in named if name not in self._hostile.names]
         self._speed = number(self, "speed_m_s", 3.0, 0.0, 100.0)
         self._waypoints = self._rows("waypoints_m", [[0.0, 0.0]], 2)
         if not len(self._waypoints):
@@ -90,8 +91,6 @@ class FlockNode(SavedAttributes, Node):
             raise PlanError("goals_m has one goal for each UAV")
         self._own_goals = np.array(own_goals, float).reshape(-1, 2)
         self._arrival = number(self, "arrival_m", 3.0, 0.1, 1000.0)
-        self._hostile_m = number(self, "hostile_m", 20.0, 0.1, 1000.0)
-        self._flee_speed = number(self, "flee_m_s", 5.0, 0.0, 100.0)
         arena = self.declare_parameter("arena_m", []).value or NO_ARENA
         if len(arena) != len(NO_ARENA):
             raise PlanError("arena_m is [x_min, y_min, x_max, y_max]")
@@ -103,7 +102,6 @@ class FlockNode(SavedAttributes, Node):
         self._ticks = 0
         self._last_status = ""
         self._team = TeamLink(self, names, odometry, self._height)
-        self._hostile = TeamLink(self, hostile, odometry, self._height, is_commanded=False)
         scan = str(self.declare_parameter("scan", "").value)
         self._scans = TeamScans(self, self._team, scan)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
@@ -149,8 +147,7 @@ class FlockNode(SavedAttributes, Node):
         goals = self._goals_now(position)
         flock = flock_within(position, velocity, self._behaviour.radius_m)
         preferred = self._preferred(goals - position)
-        for hostile in self._hostile.present(now_ns).values():
-            self._flee(position - hostile.position[:2], preferred)
+        self._hostile.add_flight(position, preferred, now_ns)
         around = self._around._replace(echoes=self._scans.echoes(team.members, position))
         wanted = self._behaviour.velocities(flock, preferred, around)
         for row, level in zip(team.members, wanted, strict=True):
@@ -185,17 +182,6 @@ class FlockNode(SavedAttributes, Node):
         speed = np.minimum(self._speed, _APPROACH * distance)
         preferred: Array = offsets / np.maximum(distance, 1e-9) * speed
         return preferred
-
-    def _flee(self, away: Array, preferred: Array) -> None:
-        """Adds to preferred velocities (M, 2) what UAVs lack to part from a hostile UAV.
-
-        away: (M, 2) m, from that UAV. Velocities across the way are left: the team passes it.
-        """
-        distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-        outward = away / distance
-        part = np.clip(2.0 - 2.0 * distance / self._hostile_m, 0.0, 1.0)
-        lacking = part * self._flee_speed - (preferred * outward).sum(axis=1, keepdims=True)
-        preferred += np.where(part > 0.0, np.maximum(lacking, 0.0), 0.0) * outward
 
     def _publish_status(self, position: Array, velocity: Array, goals: Array) -> None:
         apart = np.linalg.norm(position[:, None] - position, axis=2)

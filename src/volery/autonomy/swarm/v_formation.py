@@ -17,6 +17,7 @@ from volery.autonomy.swarm.ares import AresPlan, AresSettings
 from volery.autonomy.swarm.behaviour import Surroundings, flock_within
 from volery.autonomy.swarm.formation_fitness import FormationFitness, formation_fitness
 from volery.autonomy.swarm.formation_search import FormationSearch
+from volery.autonomy.swarm.hostile_uavs import HostileUavs
 from volery.autonomy.swarm.orca import Orca, OrcaSettings
 from volery.autonomy.swarm.particle_swarm import approach_margin, vehicle_limits
 from volery.autonomy.swarm.random_start import random_start
@@ -24,6 +25,7 @@ from volery.autonomy.swarm.team_link import TeamLink, limited, number
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
+from volery.core.vectors import norm
 from volery.graph.messages import String
 from volery.graph.nodes.node import Node
 
@@ -46,6 +48,8 @@ GATHER_APART = 0.7
 """Distance that UAVs keep on their paths to the start positions, in wing spans."""
 _SEVEN = 7
 _DRAWS = 1_000
+_SLOWEST = 0.25
+"""Speed of a bird that plans from a flight without a formation, wing spans per step."""
 _MAX_LEAD = 8
 """Maximum steps that a search may last."""
 _MAX_KICKS = 10
@@ -65,6 +69,8 @@ class VFormationPhase(StrEnum):
     """Follows a plan."""
     CRUISE = "cruise"
     """Flies on after a plan."""
+    FLEE = "flee"
+    """Flees from a hostile UAV, without a formation."""
 
 
 class VFormation(SavedAttributes, Node):
@@ -89,6 +95,7 @@ class VFormation(SavedAttributes, Node):
     lost_cost: cost of the formation above which a V is lost.
     seed: of starts and searches.
     gathers: whether the team first flies to random positions.
+    hostile, hostile_m, flee_m_s: as in `flock`; the team forms a V anew when they are far.
 
     """
 
@@ -98,7 +105,7 @@ class VFormation(SavedAttributes, Node):
         *("_last_status", "_note", "_solved_ns"),
     )
 
-    PARTS = ("_team",)
+    PARTS = ("_team", "_hostile")
     WARMUP_TASKS = (
         "volery.autonomy.swarm.warmup:formation_search",
         "volery.autonomy.swarm.warmup:flocking",
@@ -106,11 +113,13 @@ class VFormation(SavedAttributes, Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("v_formation", **options)
-        names = self.declare_parameter("uavs", [f"uav{k + 1}" for k in range(_SEVEN)]).value
+        named = self.declare_parameter("uavs", [f"uav{k + 1}" for k in range(_SEVEN)]).value
         odometry = str(self.declare_parameter("odometry", "odom").value)
         self._span = number(self, "wing_span_m", WING_SPAN_M, 0.1, 100.0)
         self._duration_s = number(self, "step_s", 2.0, 0.1, 100.0)
         self._height = number(self, "height_m", 5.0, 0.5, 1000.0)
+        self._hostile = HostileUavs(self, odometry, self._height)
+        names = [name for name in named if name not in self._hostile.names]
         self._height_step = number(self, "height_step_m", 0.0, 0.0, 100.0)
         distance = number(self, "min_distance", MIN_DISTANCE, 0.0, 1.5)
         self._slices = int(self.declare_parameter("slices", 10, min_value=1, max_value=1000).value)
@@ -121,8 +130,9 @@ class VFormation(SavedAttributes, Node):
         acceleration = number(self, "max_acceleration_m_s2", 1.0, 0.01, 100.0)
         limits = vehicle_limits(distance, max_speed, acceleration, self._span, self._duration_s)
         self._settings = AresSettings(limits=limits)
+        fastest = max(max_speed, self._hostile.speed_m_s) if self._hostile.names else max_speed
         self._avoidance = Orca(
-            OrcaSettings(distance_m=GATHER_APART * self._span, max_speed_m_s=max_speed)
+            OrcaSettings(distance_m=GATHER_APART * self._span, max_speed_m_s=fastest)
         )
 
         self.phase = VFormationPhase.ASCEND
@@ -158,7 +168,7 @@ class VFormation(SavedAttributes, Node):
                 self._begin(now_ns)
             return
         self._drop_lost(now_ns)
-        if not self._team.members:
+        if not self._team.members or self._flees(now_ns):
             return
         if self.phase is VFormationPhase.GATHER:
             if self._has_gathered():
@@ -171,6 +181,30 @@ class VFormation(SavedAttributes, Node):
             if self.phase is not VFormationPhase.SEARCH and now_ns >= self._step_ns:
                 self._end_step(now_ns)
         self._steer()
+
+    def _flees(self, now_ns: int) -> bool:
+        """Flies away from near hostile UAVs; returns whether there are some."""
+        rows, (position, velocity) = self._team.members, self._team.motion()
+        wanted = np.tile(velocity.mean(axis=0), (len(rows), 1))
+        if not self._hostile.add_flight(position, wanted, now_ns):
+            if self.phase is VFormationPhase.FLEE:
+                self._restart_search(now_ns, "fled from a hostile UAV")
+            return False
+        self._bird[rows], self._velocity[rows] = position, self._of_birds(velocity)
+        if self.phase is not VFormationPhase.FLEE:
+            self.phase, self._search, self._plan = VFormationPhase.FLEE, None, None
+            self._publish_status()
+        flock = flock_within(position, velocity, self._avoidance.radius_m)
+        self._command(self._avoidance.velocities(flock, wanted, Surroundings()))
+        return True
+
+    def _of_birds(self, velocity: Array) -> Array:
+        """Returns velocities (M, 2) as birds may have them, which never stand still."""
+        middle = velocity.mean(axis=0)
+        slowest = _SLOWEST * self._span / self._duration_s
+        ahead = middle / norm(middle) if norm(middle) > 1e-3 else np.array([1.0, 0.0])
+        flown = [each if norm(each) > slowest else slowest * ahead for each in velocity]
+        return np.array([limited(each, self._max_speed) for each in flown])
 
     def _begin(self, now_ns: int) -> None:
         self._bird[:] = self._team.motion()[0]
@@ -316,7 +350,11 @@ class VFormation(SavedAttributes, Node):
         if self.phase is VFormationPhase.GATHER:
             flock = flock_within(position, velocity, self._avoidance.radius_m)
             wanted = self._avoidance.velocities(flock, wanted, Surroundings())
-        for row, level in zip(rows, wanted, strict=True):
+        self._command(wanted)
+
+    def _command(self, wanted: Array) -> None:
+        """Commands the members velocities (M, 2) m/s."""
+        for row, level in zip(self._team.members, wanted, strict=True):
             height = self._height + self._height_step * (row % 2)
             self._team.command(row, limited(level, OVERSPEED * self._max_speed), height)
 

@@ -128,3 +128,22 @@ def test_it_waits_for_all_uavs():
     team.fly(10.0)
     assert team.node.phase == "ascend"
     assert not team.velocities.any()
+
+
+def test_a_team_flees_from_a_hostile_uav_and_forms_a_v_again():
+    row = [[3.0 * k, 0.0, 5.0] for k in range(4)]
+    hunter = [500.0, 500.0, 5.0]
+    team = SwarmTeam(VFormation, [*row, hunter], step_s=2.0, slices=200, hostile=["uav5"])
+    team.fly_until(is_v)
+    assert team.status["members"] == ["uav1", "uav2", "uav3", "uav4"]
+    middle = team.positions[:4].mean(axis=0)
+    team.positions[4] = middle + np.array([8.0, 0.0, 0.0])
+    team.fly(2.0)
+    assert team.status["phase"] == "flee"
+    team.fly(6.0)
+    gaps = np.linalg.norm(team.positions[:4] - team.positions[4], axis=1)
+    assert gaps.min() > 15.0
+    apart = np.linalg.norm(team.positions[:4, None] - team.positions[:4], axis=2)
+    assert apart[np.triu_indices(4, 1)].min() > 1.5
+    team.fly_until(is_v)
+    assert team.status["searches"] > 1
