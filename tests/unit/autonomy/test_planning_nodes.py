@@ -90,7 +90,7 @@ class Glade:
 
 
 def test_it_plans_towards_the_path_several_times_a_second():
-    glade = Glade()
+    glade = Glade(speed_m_s=1.0)
     glade.go_on(1.0)
     assert last_status(glade.status)["state"] == "waiting"
     assert glade.plans == []
@@ -102,7 +102,7 @@ def test_it_plans_towards_the_path_several_times_a_second():
     assert state["problems"] == [PUSHED]  # the bench's UAV does not move
     samples = samples_of(glade.plans[-1])
     assert glade.plans[-1].header.frame_id == "uav1/odom"
-    assert samples.position[-1, 0] > 1.0
+    assert samples.position[-1, 0] > 0.2
     assert abs(samples.position[-1, 2] - HEIGHT) < 0.3
     np.testing.assert_allclose(samples.velocity[-1], 0.0, atol=1e-9)
     assert abs(samples.yaw) < 0.2
@@ -140,6 +140,18 @@ def test_deviations_are_forgotten_in_calm_air():
     for k in range(131, 200):
         tracking.add(0.1, k * S)
     assert tracking.margin_m == 0.0
+
+
+def test_deviations_are_too_large_until_they_are_much_smaller():
+    tracking = TrackingError()
+    tracking.add(1.3, 1 * S)
+    assert tracking.is_too_large
+    for k in range(2, 12):
+        tracking.add(0.1, k * S)
+    assert tracking.is_too_large  # 1.3 m have faded to 0.9 m
+    for k in range(12, 20):
+        tracking.add(0.1, k * S)
+    assert not tracking.is_too_large
 
 
 def test_deviations_by_wrong_odometry_are_retracted():

@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 from team_bench import AREA, TeamBench
 
 from volery.autonomy.perception.map_frame import UNKNOWN_POSE
+from volery.autonomy.planning.local_planner import TOO_DISTURBED
 from volery.autonomy.search.search_positions import Area
 from volery.autonomy.team.assignment import SectorClaim, Worker, assign, must_yield
 from volery.autonomy.team.mission_messages import goal_at
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits
 from volery.autonomy.team.target_list import Detection, TargetList
+from volery.autonomy.team.task_manager import BLOWN
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import String, TFMessage, header, message_type
@@ -473,6 +475,26 @@ def test_an_explorer_says_when_it_is_through() -> None:
     assert sectors == [first, first, second, second, second, third, third]
     assert len({first, second, third}) == 3
     assert manager.member.searched.nonzero()[0].tolist() == [first]
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_a_uav_that_disturbances_push_off_its_plans_lands_and_says_why(goes_on: bool) -> None:
+    bench = TeamBench({"uav1": (0.0, 0.0)})
+    bench.run(6.0)
+    manager = bench.managers["uav1"]
+    assert str(manager.phase) == "search"
+    says = bench.graph.advertise("/uav1/planning/status", String)
+    for second in range(18):
+        fine = goes_on and second == 9
+        says.publish(String(json.dumps({"problems": [] if fine else [TOO_DISTURBED]})))
+        bench.run(1.0)
+    says.publish(String("[" * 100_000))  # no status ends nothing
+    if goes_on:
+        assert (str(manager.phase), manager.problem) == ("search", "")
+    else:
+        assert str(manager.phase) in ("land", "done")
+        assert manager.problem == BLOWN
+        assert manager.member.sector == -1
 
 
 def test_a_corrected_pose_is_one_in_the_map() -> None:

@@ -92,6 +92,7 @@ _MAX_RADIUS_M = 1.5
 _DISTURBED_M = 0.2
 """Margin for disturbances from which the status mentions it, m."""
 PUSHED = "the UAV is pushed off its plans: it flies slower, farther from obstacles"
+TOO_DISTURBED = "disturbances push the UAV too far off its plans"
 _STATUS_PERIOD_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
 
@@ -101,8 +102,8 @@ class LocalPlanner(SavedAttributes, Node):
 
     An empty path makes the UAV hold. The status is JSON: state (waiting, holding, flying, turning,
     blocked, arrived, paused), problems, left_m, clearance_m, plans, off_m (largest deviation from
-    plans of the last half minute). `planning/pause` (std_msgs/Bool, true) stops planning and clears
-    the path.
+    plans of the last half minute). The UAV holds while that is too large. `planning/pause`
+    (std_msgs/Bool, true) stops planning and clears the path.
 
     Parameters
     ----------
@@ -266,6 +267,8 @@ class LocalPlanner(SavedAttributes, Node):
         else:
             self._measure_tracking(pose, now)
         self._is_faulty = bool(problems)
+        if self._tracking.is_too_large:
+            problems.append(TOO_DISTURBED)
         self._planning.policy = self._policy()
         start = self._planning.start(present, pose.yaw, now, then)
         if problems or self._lookahead_here() is None:

@@ -13,6 +13,8 @@ _NOTICED_S = 1.0
 """Time within which faults of the odometry are noticed."""
 _EXPECTED_M = 0.3
 """Deviation that the radius of the planner includes: the largest in calm air."""
+_TOO_LARGE_M, _CALM_M = 1.2, 0.8
+"""Distances at which a vehicle can no longer fly among obstacles, and can again."""
 _STRONGER = 1.5
 """Factor by which the next gust may push farther than the last ones."""
 
@@ -20,11 +22,13 @@ _STRONGER = 1.5
 class TrackingError(SavedAttributes):
     """Largest horizontal distance of the last half minute between a vehicle and its plan."""
 
-    STATE = ("_recent", "_earlier_m", "_time_ns")
+    STATE = ("is_too_large", "_recent", "_earlier_m", "_time_ns")
 
     def __init__(self) -> None:
         self._recent: tuple[tuple[int, float], ...] = ()
         """Times, ns, and distances, m, of the last second."""
+        self.is_too_large = False
+        """Whether no margin is enough; until the largest distance is much smaller again."""
         self._earlier_m = 0.0
         """Largest distance before `_recent`, which decays with time."""
         self._time_ns = 0
@@ -44,6 +48,7 @@ class TrackingError(SavedAttributes):
                 self._earlier_m = max(self._earlier_m, _faded(distance, now_ns - time_ns))
         recent = tuple(entry for entry in self._recent if entry[0] > since_ns)
         self._recent = (*recent, (now_ns, distance_m))
+        self.is_too_large = self.largest_m > (_CALM_M if self.is_too_large else _TOO_LARGE_M)
 
     def retract(self) -> None:
         """Drops the distances of the last second: the odometry was wrong."""

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.planning.local_planner import TOO_DISTURBED
 from volery.autonomy.team.assignment import SectorClaim, assign, must_yield
 from volery.autonomy.team.ground_contact import STILL_M_S, GroundContact
 from volery.autonomy.team.member import POSE_TIMEOUT_S, TeamMember
@@ -53,12 +54,15 @@ _RETURN_TIMEOUT_S = 60.0
 """Duration without progress towards home after which the UAV lands."""
 _LOST_TIMEOUT_S = 30.0
 """Duration without a position after which the UAV lands."""
+_DISTURBED_TIMEOUT_S = 15.0
+"""Duration for which a planner holds because of disturbances after which the UAV lands."""
 _HOME_M, _NEARER_M = 1.5, 1.0
 _STOPPED_M_S = 0.3
 """Speed over ground below which a UAV over home has stopped, and may land."""
 _LANDED_M, _SUNK_M = 0.3, 0.25
 _NEVER_NS = -1 << 62
 HELD, LANDED = "held by the operator", "landed by the operator"
+BLOWN = f"landed: {TOO_DISTURBED}"
 DOWN = "came down, and not by its mission"
 """All limits are modelling choices."""
 """All attributes that change."""
@@ -75,6 +79,8 @@ class TaskManager(SavedAttributes, Node):
     leave its sector to others, until `~/resume`. While it holds, `planning/pause` (std_msgs/Bool)
     stops the planners. A UAV that stands on the ground by its sonar without an order to land gives
     its sector up.
+    A local planner may publish on `planning/status` (JSON) that disturbances push the UAV too far
+    off its plans; after 15 s of this the UAV lands where it is.
     An explorer may publish on `exploration/status` (JSON with a `state`: searching, then done or
     blocked) that it is through with an area; else the cells in sight decide.
 
@@ -112,6 +118,7 @@ class TaskManager(SavedAttributes, Node):
         "_has_risen",
         "_climbs",
         "_explores",
+        "_disturbed_ns",
     )
 
     def __init__(self, **options: Any) -> None:
@@ -137,6 +144,8 @@ class TaskManager(SavedAttributes, Node):
         """Whether the UAV climbs from the air, which no take-off does."""
         self._explores = False
         """Whether the explorer has begun with the present sector."""
+        self._disturbed_ns: int | None = None
+        """Time since when the local planner holds because of disturbances; None: it does not."""
         self.member = TeamMember(self, self.settings)
         self.ground = GroundContact()
         self._phases: dict[MissionPhase, Callable[[OdometrySample, int], None]] = {
@@ -158,6 +167,7 @@ class TaskManager(SavedAttributes, Node):
             self.create_service("std_srvs/srv/Trigger", f"~/{order}", getattr(self, f"_on_{order}"))
         self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(String, "exploration/status", self._on_explorer, 5)
+        self.create_subscription(String, "planning/status", self._on_planner, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
 
     @property
@@ -174,13 +184,21 @@ class TaskManager(SavedAttributes, Node):
 
     def _on_explorer(self, message: String) -> None:
         """Marks the sector by an explorer's state: searched, or given up."""
-        now, state, member = self._now_ns, _state_in(message.data), self.member
+        now, member = self._now_ns, self.member
+        state = str(_status_in(message.data).get("state", ""))
         if state == "searching":
             self._explores = True
         elif self._explores and self.phase is MissionPhase.SEARCH and state in ("done", "blocked"):
             member.searched[member.sector] = state == "done"
             member.given_up[member.sector] |= state == "blocked"
             self._drop(now)
+
+    def _on_planner(self, message: String) -> None:
+        problems = _status_in(message.data).get("problems")
+        if isinstance(problems, list) and TOO_DISTURBED in problems:
+            self._disturbed_ns = self._now_ns if self._disturbed_ns is None else self._disturbed_ns
+        else:
+            self._disturbed_ns = None
 
     # ---------------------------------------------------------------------------- operator's orders
 
@@ -291,6 +309,8 @@ class TaskManager(SavedAttributes, Node):
     def _act(self, pose: OdometrySample, now: int) -> None:
         if self.phase in ALOFT and self.ground.has_come_down(pose, now):
             self._suspend(MissionPhase.DOWN, DOWN)
+        elif self.phase in ALOFT and self._is_blown(now):
+            self._suspend(MissionPhase.LAND, BLOWN)
         elif self._turns_home(now):
             self._go_home(now)
         run = self._phases.get(self.phase)
@@ -376,6 +396,10 @@ class TaskManager(SavedAttributes, Node):
         if self.phase is MissionPhase.IDLE:
             self._area.publish(polygon_of(None, float(self._home[2]), now))
 
+    def _is_blown(self, now: int) -> bool:
+        since_ns = self._disturbed_ns
+        return since_ns is not None and now - since_ns > _DISTURBED_TIMEOUT_S * NS_PER_S
+
     def _turns_home(self, now: int) -> bool:
         """Whether the UAV returns home now; while it is held, only for its battery."""
         if self.phase is MissionPhase.HOLD:
@@ -454,10 +478,10 @@ def _answer(response: Any, success: bool, message: str) -> Any:
     return response
 
 
-def _state_in(text: str) -> str:
-    """Returns the `state` of a JSON text; empty where there is none."""
+def _status_in(text: str) -> dict[str, Any]:
+    """Returns a JSON object; an empty one where the text is none."""
     try:
         status = json.loads(text)
-    except json.JSONDecodeError:
-        return ""
-    return str(status.get("state", "")) if isinstance(status, dict) else ""
+    except (json.JSONDecodeError, RecursionError):
+        return {}
+    return status if isinstance(status, dict) else {}
