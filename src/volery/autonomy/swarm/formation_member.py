@@ -44,6 +44,8 @@ REPORT = "volery_interfaces/msg/TeamReport"
 _PERIOD_S, _REPORT_S = 0.05, 0.2
 _SILENCE_S = 2.0
 """Time without reports after which a UAV counts as lost."""
+_WAIT_S = 60.0
+"""Time at the start position after which a UAV no longer waits for those that it does not hear."""
 _SLOTS = 0.8
 """Part of a step in which all plan."""
 _SENSIBLE_M = 1e6
@@ -92,8 +94,8 @@ class FormationMember(SavedAttributes, Node):
 
     Parameters
     ----------
-    uavs: names of the team. They wait for each other before they set off; later the team consists
-        of those that are heard.
+    uavs: names of the team. They wait for each other before they set off, a minute for those that
+        they do not hear; later the team consists of those that are heard.
     odometry: topic of the odometry; its frame must be fixed to the map, the same for all.
     wing_span_m, step_s, height_m, height_step_m, min_distance, max_speed_m_s,
         max_acceleration_m_s2: as in `v_formation`.
@@ -106,7 +108,7 @@ class FormationMember(SavedAttributes, Node):
 
     STATE = (
         *("phase", "_anchor", "_anchor_ns", "_velocity", "_next", "_step", "_mates"),
-        *("_reported_ns", "_solved_ns", "_last_status"),
+        *("_ready_ns", "_reported_ns", "_solved_ns", "_last_status"),
     )
     PARTS = ("_link", "_planner")
     WARMUP_TASKS = (
@@ -158,6 +160,8 @@ class FormationMember(SavedAttributes, Node):
         self._step = -1
         """Number of the present step since the beginning of the clock."""
         self._mates: dict[str, _Mate] = {}
+        self._ready_ns = 0
+        """Time at which the UAV was at its start position, ns."""
         self._reported_ns = -NS_PER_S
         self._solved_ns = -1
         self._last_status = ""
@@ -235,26 +239,27 @@ class FormationMember(SavedAttributes, Node):
             self._anchor, self._anchor_ns, self._velocity = position, now_ns, velocity
             self._step = now_ns // self._step_ns
             if np.abs(position - self._start).max() < NEAR_M:
-                self.phase = MemberPhase.READY
+                self.phase, self._ready_ns = MemberPhase.READY, now_ns
                 self._anchor, self._velocity = self._start, self._first_velocity
                 self._publish_status()
         elif self.phase is MemberPhase.READY:
             self._anchor_ns = now_ns
             step = now_ns // self._step_ns
-            if step != self._step and self._is_team_ready():
+            if step != self._step and self._is_team_ready(now_ns):
                 self._set_off(now_ns)
             self._step = step
         else:
             self._fly(now_ns, position)
         self._steer(now_ns, position, velocity)
 
-    def _is_team_ready(self) -> bool:
-        """Returns whether all that are heard wait here, or one of them has set off."""
+    def _is_team_ready(self, now_ns: int) -> bool:
+        """Returns whether all wait at their starts, or one of them has set off."""
         phases = [mate.phase for mate in self._mates.values()]
         if any(phase in _FLYING for phase in phases):
             return True
-        are_all = len(phases) == len(self._names) - 1
-        return are_all and all(phase is MemberPhase.READY for phase in phases)
+        has_waited = bool(phases) and now_ns - self._ready_ns > ns_from_s(_WAIT_S)
+        is_complete = has_waited or len(phases) == len(self._names) - 1
+        return is_complete and all(phase is MemberPhase.READY for phase in phases)
 
     def _set_off(self, now_ns: int) -> None:
         """Leaves the start; the foremost UAVs search a formation that the others join."""

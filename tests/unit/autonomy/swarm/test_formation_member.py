@@ -182,6 +182,15 @@ def test_a_uav_that_hears_none_sets_off_never_and_one_without_start_gathers_not(
     np.testing.assert_allclose(team.positions[:, 0], [-5.0, 5.0], atol=0.1)
 
 
+def test_a_team_waits_a_minute_for_one_that_it_does_not_hear():
+    team = Team(count=3)
+    team.silent = {2}
+    team.fly(60.0)
+    assert [node.phase for node in team.nodes] == [MemberPhase.READY] * 2 + [MemberPhase.WAIT]
+    team.fly(25.0)
+    assert all(node.phase in (MemberPhase.SEARCH, MemberPhase.JOIN) for node in team.nodes[:2])
+
+
 def test_reports_that_make_no_sense_are_refused():
     team = Team(count=2)
     bad = {
