@@ -62,7 +62,7 @@ class MemberPhase(StrEnum):
     READY = "ready"
     """Hovers there until the others are ready."""
     SEARCH = "search"
-    """Flies in the formation, and looks for a better place nearby."""
+    """Flies in the formation, and looks for a better position nearby."""
     JOIN = "join"
     """Flies to an end of the formation."""
     LOST = "lost"

@@ -1,9 +1,10 @@
 """Plans the next velocity of one bird from what it hears of its flock: a V without a leader.
 
-After A. Lukina et al., "Distributed adaptive-neighborhood control for stochastic reachability in
-multi-agent systems", 2019 (arXiv 1805.07929): each bird optimizes the fitness of its
-neighbourhood by its own acceleration. A bird that this leaves without a place in the V flies to an
-end of an arm, as the further birds of a larger flock do from the beginning.
+After DAMPC (A. Lukina et al., "Adaptive neighborhood resizing for stochastic reachability in
+multi-agent systems", 2018, arXiv 1805.07929): each bird optimizes the fitness of its neighbourhood
+by its own acceleration. Here the birds plan in turn, and neighbourhoods have one size. A bird that
+this leaves without a position in the V flies to an end of an arm, as the further birds of a larger
+flock do from the beginning.
 """
 
 from __future__ import annotations
@@ -26,14 +27,12 @@ _ENOUGH = 0.8
 _PROGRESS = 0.95
 """Part of the least cost so far that counts as progress."""
 _PATIENCE = 4
-"""Steps without progress after which a bird without upwash looks for another place."""
+"""Steps without progress after which a bird without upwash looks for another position."""
 _FORMED_COST = 0.3
 """Cost of the birds in formation below which the others fly to its ends."""
 _SOLVED_COST = 0.02
-_HAS_PLACE = 0.9
-"""Upwash of a bird that has a place."""
-_MAX_JOINING = 2
-"""Birds of a formation that look for another place at the same time."""
+_HAS_POSITION = 0.9
+"""Upwash of a bird that has a position."""
 _AHEAD = 60
 """Steps of a trajectory to an end."""
 
@@ -94,7 +93,7 @@ class MemberPlanner(SavedAttributes):
     # ------------------------------------------------------------------------------------- inside
 
     def _choose_role(self, flock: Array, formed: list[int], me: int) -> None:
-        """Joins where it has no place in the formation; ends joining where it has one."""
+        """Joins where it has no position in the formation; ends joining where it has one."""
         if not formed:
             self.is_joining = self._waits = False  # others join this bird
             return
@@ -104,14 +103,14 @@ class MemberPlanner(SavedAttributes):
         ahead = formation[2:].mean(axis=1) @ formation[:2]
         mine = rows.index(me)
         if self.is_joining:
-            if upwash[mine] > _HAS_PLACE and not self._waits:
+            if upwash[mine] > _HAS_POSITION and not self._waits:
                 self.is_joining = False
                 self._forget()
             return
         upwash[int(np.argmax(ahead))] = 1.0  # the first one needs none
         if (
             self._stalled_steps >= _PATIENCE
-            and upwash[mine] < _HAS_PLACE
+            and upwash[mine] < _HAS_POSITION
             and int(np.argmin(upwash)) == mine
         ):
             self.is_joining = True
