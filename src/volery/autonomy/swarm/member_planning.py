@@ -37,6 +37,8 @@ _AHEAD = 60
 """Steps of a trajectory to an end."""
 
 
+_SLOWEST = 0.05
+"""Speed, wing spans per step, below which no bird flies: it could not accelerate again."""
 _CHANGES = np.array(
     [
         size * np.array([np.cos(turn), np.sin(turn)])
@@ -83,6 +85,8 @@ class MemberPlanner(SavedAttributes):
         self._choose_role(flock, formed, me)
         if not self.is_joining:
             wanted = self._search(flock, formed, me)
+        elif norm(flock[2:, formed].mean(axis=1)) < _SLOWEST:
+            wanted = flock[2:, me]  # a formation at rest has no arms
         elif self._waits and fitness_cost(np.ascontiguousarray(flock[:, formed])) > _FORMED_COST:
             wanted = flock[2:, formed].mean(axis=1)
         else:
@@ -129,7 +133,7 @@ class MemberPlanner(SavedAttributes):
             self._least_cost, self._stalled_steps = min(cost, self._least_cost), 0
         else:
             self._stalled_steps += 1
-        if cost < _FORMED_COST:
+        if cost < _FORMED_COST and norm(around[2:].mean(axis=1)) >= _SLOWEST:
             return self._settle(around, mine)
         least, chosen, found = np.inf, np.zeros(2), np.empty(2)
         for horizon in range(1, _MAX_HORIZON + 1):
@@ -183,18 +187,18 @@ class MemberPlanner(SavedAttributes):
         If none keeps the distance, the one that comes least near.
         """
         own, limits = flock[2:, me], self._limits
-        velocity = np.concatenate(([wanted], own + _CHANGES * self._max_change(own)))
-        velocity[0] = own + _shortened(wanted - own, self._max_change(own))
-        speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-        velocity *= np.minimum(1.0, limits.max_speed / np.maximum(speed, 1e-12))
+        largest = max(self._max_change(own), 2.0 * _SLOWEST)
+        change = wanted - own if np.isfinite(wanted).all() else np.zeros(2)
+        velocity = own + np.concatenate(([_shortened(change, largest)], _CHANGES * largest))
+        speed = np.linalg.norm(velocity, axis=1)
+        velocity *= np.minimum(1.0, limits.max_speed / np.maximum(speed, 1e-12))[:, None]
+        nearest, velocity = velocity[0], velocity[speed >= _SLOWEST]
         others = [row for row in range(flock.shape[1]) if row != me]
-        if limits.min_distance <= 0.0 or not others:
-            return np.array(velocity[0])
         offset = flock[:2, me] - flock[:2, others].T
         margin = _margins(offset, velocity[:, None] - flock[2:, others].T, limits.min_distance)
         if (margin < 0.0).all():
             return np.array(velocity[int(np.argmax(margin))])
-        away = np.linalg.norm(velocity - velocity[0], axis=1)
+        away = np.linalg.norm(velocity - nearest, axis=1)
         return np.array(velocity[int(np.argmin(np.where(margin >= 0.0, away, np.inf)))])
 
     def _max_change(self, own: Array) -> float:
@@ -215,4 +219,4 @@ def _margins(offset: Array, velocity: Array, min_distance: float) -> Array:
     time = np.clip(-(velocity * offset).sum(axis=-1) / square, 0.0, 1.0)
     nearest = np.linalg.norm(offset + time[..., None] * velocity, axis=-1)
     allowed = np.minimum(min_distance, np.linalg.norm(offset, axis=-1))
-    return np.asarray((nearest - allowed + 1e-9).min(axis=-1))
+    return np.asarray((nearest - allowed + 1e-9).min(axis=-1, initial=np.inf))

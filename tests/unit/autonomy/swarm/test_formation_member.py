@@ -78,6 +78,14 @@ def test_a_velocity_keeps_the_distance_where_that_is_possible():
     assert np.linalg.norm(apart) >= 1.0 - 1e-6
 
 
+def test_a_bird_at_rest_flies_off_and_one_without_a_heading_of_its_flock_goes_on():
+    flock = np.array([[0.0, 3.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    bird = MemberPlanner(LIMITS)
+    bird.is_joining = True
+    velocity = bird.velocity(flock, np.array([True, False]), 0)
+    assert 0.05 <= np.linalg.norm(velocity) <= 0.2
+
+
 class Team(NodeBench):
     """UAVs in a row, 10 m apart, that follow commands at once, each with a node of its own."""
 
