@@ -159,7 +159,9 @@ def test_deviations_by_wrong_odometry_are_retracted():
     for k in range(40):
         tracking.add(0.4 if k < 20 else 2.0, k * S // 20)  # s 1 to 2 are wrong
     assert tracking.largest_m == 2.0
+    assert tracking.is_too_large
     tracking.retract()
+    assert not tracking.is_too_large
     assert 0.35 < tracking.largest_m < 0.4
 
 

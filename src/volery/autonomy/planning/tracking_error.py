@@ -53,6 +53,7 @@ class TrackingError(SavedAttributes):
     def retract(self) -> None:
         """Drops the distances of the last second: the odometry was wrong."""
         self._recent = ()
+        self.is_too_large &= self._earlier_m > _CALM_M
 
     @property
     def margin_m(self) -> float:
