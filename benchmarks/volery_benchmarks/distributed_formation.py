@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,14 +16,13 @@ from volery.core.arrays import Array
 from volery.graph.messages import message_type
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
-from volery_benchmarks.formation_flight import FormationFlight
+from volery_benchmarks.formation_flight import FormationFlight, fly_scenario, least_distance_m
 
 _STEPS = 150
 _SOLVED = 1e-3
 """Cost of a V, as for plans of the whole flock."""
 _LIMITS = FlockLimits(min_distance=1.0, max_speed=2.67, max_acceleration=1.33)
 """Those of the node's defaults, in wing spans and steps."""
-_TAKE_OFF_S, _FORM_S, _RECOVER_S = 60.0, 240.0, 120.0
 _SPAN_M, _STEP_S, _LOST = 3.0, 2.0, 0.1
 _WATCH_S = 0.5
 
@@ -59,52 +59,33 @@ def fly(seed: int, uavs: int, lost: int) -> FormationFlight:
     scenario = load_scenario("v_formation_distributed").with_(
         changes, uavs=uavs, seed=seed, duration_s=1e4
     )
-    rng = np.random.default_rng(seed)
-    with Simulation(scenario) as simulation:
-        watch = _Watch(simulation)
-        simulation.run_until(lambda: watch.has_reports, _TAKE_OFF_S)
-        start, wall = simulation.time_s, time.perf_counter()
-        time_to_v = watch.wait_for_v(_FORM_S) - start
-        factor = (simulation.time_s - start) / (time.perf_counter() - wall)
-        begun = simulation.time_s
-        for name in rng.choice(sorted(simulation.uavs), lost, replace=False):
-            simulation.uavs[name].land()
-            watch.names.remove(str(name))
-        again = watch.wait_for_v(_RECOVER_S) if time_to_v > 0.0 else math.nan
-        return FormationFlight(time_to_v, again - begun, watch.min_distance_m, factor)
+    return fly_scenario(scenario, _TrueWatch, lost)
 
 
-class _Watch:
-    """Follows the true formation of UAVs, and the distances between those in the air."""
+class _TrueWatch:
+    """Follows the true formation; the first report of a UAV ends the take-off."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self.names = sorted(simulation.uavs)
-        """UAVs that are to be in the formation."""
         self.min_distance_m = math.inf
-        self.has_reports = False
-        topic = f"/{self.names[0]}/team"
+        self.has_begun = False
+        topic = f"/{simulation.vehicles.names[0]}/team"
         simulation.graph.subscribe(topic, self._on_report, message_type(REPORT))
 
     def _on_report(self, _published: object) -> None:
-        self.has_reports = True
+        self.has_begun = True
 
-    def wait_for_v(self, timeout_s: float) -> float:
-        """Returns the time of the next V, s; NaN if there is none until the timeout."""
-        until = self._simulation.time_s + timeout_s
-        while self._simulation.time_s < until:
-            self._simulation.run(_WATCH_S)
-            if self._look() < _LOST:
-                return self._simulation.time_s
+    def wait_for_v(self, timeout_s: float, lost: Sequence[str] = ()) -> float:
+        """See `FormationWatch`."""
+        simulation = self._simulation
+        rows = [k for k, name in enumerate(simulation.vehicles.names) if name not in lost]
+        until = simulation.time_s + timeout_s
+        while simulation.time_s < until:
+            simulation.run(_WATCH_S)
+            self.min_distance_m = min(self.min_distance_m, least_distance_m(simulation))
+            state = simulation.vehicles.state()
+            position, velocity = state.position_map[rows, :2], state.velocity_map[rows, :2]
+            cost = formation_fitness(position / _SPAN_M, velocity * _STEP_S / _SPAN_M).cost
+            if cost < _LOST:
+                return simulation.time_s
         return math.nan
-
-    def _look(self) -> float:
-        """Returns the cost of the present formation."""
-        vehicles = self._simulation.vehicles.state()
-        in_air = vehicles.position_map[~vehicles.crashed]
-        apart = np.linalg.norm(in_air[:, None] - in_air, axis=2)
-        apart[np.diag_indices(len(apart))] = math.inf
-        self.min_distance_m = min(self.min_distance_m, float(apart.min(initial=math.inf)))
-        rows = [self._simulation.vehicles.names.index(name) for name in self.names]
-        position, velocity = vehicles.position_map[rows, :2], vehicles.velocity_map[rows, :2]
-        return formation_fitness(position / _SPAN_M, velocity * _STEP_S / _SPAN_M).cost

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from volery.core.errors import WaitTimeoutError
 from volery.graph.messages import Published
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
+from volery.scenario.schema import Scenario
 
 _TOPIC = "/v_formation/status"
 _TAKE_OFF_S, _FORM_S, _RECOVER_S = 180.0, 180.0, 120.0
@@ -35,26 +37,57 @@ class FormationFlight:
     """Until the V."""
 
 
+class FormationWatch(Protocol):
+    """Follows the formation in which a team flies."""
+
+    min_distance_m: float
+    """Least distance between two UAVs in the air."""
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the take-off is over."""
+
+    def wait_for_v(self, timeout_s: float, lost: Sequence[str] = ()) -> float:
+        """Returns the time of the next V of all but the lost UAVs, s; NaN after the timeout."""
+
+
 def fly(seed: int, uavs: int, lost: int) -> FormationFlight:
     """Flies until the V, lands `lost` UAVs, and flies until the V of the others."""
     scenario = load_scenario("v_formation").with_(
         {"nodes[0].parameters.seed": seed}, uavs=uavs, seed=seed, duration_s=1e4
     )
-    rng = np.random.default_rng(seed)
+    return fly_scenario(scenario, _StatusWatch, lost)
+
+
+def fly_scenario(
+    scenario: Scenario, watched: Callable[[Simulation], FormationWatch], lost: int
+) -> FormationFlight:
+    """Flies a scenario as `fly`; the UAVs to land are drawn by its seed."""
+    rng = np.random.default_rng(scenario.seed)
     with Simulation(scenario) as simulation:
-        watch = _Watch(simulation)
-        simulation.run_until(lambda: watch.phase != "ascend", _TAKE_OFF_S)
+        watch = watched(simulation)
+        simulation.run_until(lambda: watch.has_begun, _TAKE_OFF_S)
         start, wall = simulation.time_s, time.perf_counter()
         time_to_v = watch.wait_for_v(_FORM_S) - start
         factor = (simulation.time_s - start) / (time.perf_counter() - wall)
         begun = simulation.time_s
-        for name in rng.choice(sorted(simulation.uavs), lost, replace=False):
+        names = [str(name) for name in rng.choice(sorted(simulation.uavs), lost, replace=False)]
+        for name in names:
             simulation.uavs[name].land()
-        again = watch.wait_for_v(_RECOVER_S, uavs - lost) if time_to_v > 0.0 else math.nan
+        again = watch.wait_for_v(_RECOVER_S, names) if time_to_v > 0.0 else math.nan
         return FormationFlight(time_to_v, again - begun, watch.min_distance_m, factor)
 
 
-class _Watch:
+def least_distance_m(simulation: Simulation) -> float:
+    """Returns the least distance between two UAVs in the air at present."""
+    vehicles = simulation.vehicles.state()
+    in_air = vehicles.position_map[~vehicles.crashed]
+    apart = np.linalg.norm(in_air[:, None] - in_air, axis=2)
+    apart[np.diag_indices(len(apart))] = math.inf
+    return float(apart.min(initial=math.inf))
+
+
+class _StatusWatch:
     """Follows the node's status and the distances between UAVs in the air."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -64,25 +97,22 @@ class _Watch:
         simulation.graph.subscribe(_TOPIC, self._on_status)
 
     @property
-    def phase(self) -> str:
-        """What the team does."""
-        return str(self._status["phase"])
+    def has_begun(self) -> bool:
+        """See `FormationWatch`."""
+        return str(self._status["phase"]) != "ascend"
 
     def _on_status(self, published: Published) -> None:
         self._status = json.loads(published.message.data)
-        vehicles = self._simulation.vehicles.state()
-        in_air = vehicles.position_map[~vehicles.crashed]
-        apart = np.linalg.norm(in_air[:, None] - in_air, axis=2)
-        apart[np.diag_indices(len(apart))] = math.inf
-        self.min_distance_m = min(self.min_distance_m, float(apart.min(initial=math.inf)))
+        self.min_distance_m = min(self.min_distance_m, least_distance_m(self._simulation))
 
-    def wait_for_v(self, timeout_s: float, members: int | None = None) -> float:
-        """Returns the time of the next V, s; NaN if there is none until the timeout."""
+    def wait_for_v(self, timeout_s: float, lost: Sequence[str] = ()) -> float:
+        """See `FormationWatch`."""
+        size = len(self._simulation.uavs) - len(lost) if lost else None
 
         def is_v() -> bool:
             status = self._status
-            size = len(status["members"])
-            return self.phase == "cruise" and status["cost"] < _LOST and members in (None, size)
+            is_whole = size in (None, len(status["members"]))
+            return status["phase"] == "cruise" and status["cost"] < _LOST and is_whole
 
         try:
             self._simulation.run_until(is_v, timeout_s)

@@ -240,3 +240,23 @@ def test_energy_is_the_integral_of_power() -> None:
         message.current = current
         meter.add(second * S, message)
     assert meter.energy_j == pytest.approx(30.0 + 80.0 + 40.0)  # nothing is known of a minute
+
+
+def test_a_formation_without_a_leader_is_that_of_the_first_uav_with_a_status() -> None:
+    scenario = {
+        "types": {
+            "bird": {"nodes": [{"node": "formation_member", "parameters": {"min_distance": 0.9}}]}
+        }
+    }
+    log = TeamLog()
+    for second, phase in enumerate(("ready", "search", "join", "dance")):
+        for uav in ("uav2", "uav1"):
+            status = {"phase": phase, "members": ["uav1", "uav2"], "cost": 1.0 - 0.3 * second}
+            log.add(f"/{uav}/formation_member/status", second * S, m.String(json.dumps(status)))
+    team = log.team(scenario)
+    assert team is not None
+    assert team.topic == FORMATION
+    assert team.phases == ["ready", "search", "join", ""]
+    np.testing.assert_allclose(team.numbers["cost"], [1.0, 0.7, 0.4, 0.1])
+    assert (team.separation_m, team.lost_cost) == (pytest.approx(2.7), 0.1)
+    assert len(team.search_times_s) == 0

@@ -292,11 +292,10 @@ class FormationMember(SavedAttributes, Node):
         """Commands the UAV towards its bird; on the way to the start, past the others."""
         if self.phase is MemberPhase.GATHER:
             assert self._start is not None
-            others = [m for m in self._mates.values() if m.phase is not MemberPhase.READY]
-            parked = [m for m in self._mates.values() if m.phase is MemberPhase.READY]
-            at = np.array([position, *(m.position for m in (*others, *parked))])
-            still = [np.zeros(2)] * len(parked)
-            moving = np.array([velocity, *(m.velocity for m in others), *still])
+            mates = self._mates.values()
+            at = np.array([position, *(mate.position for mate in mates)])
+            moving = np.array([velocity, *(mate.velocity for mate in mates)])
+            moving[1:][[mate.phase is MemberPhase.READY for mate in mates]] = 0.0
             wanted = np.zeros_like(at)
             wanted[0] = GAIN * (self._start - position)
             flock = flock_within(at, moving, self._avoidance.radius_m)

@@ -9,13 +9,21 @@ flock do from the beginning.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.swarm.formation_fitness import fitness_cost, upwash_of
 from volery.autonomy.swarm.joining import exact_formation, free_positions, trajectory_into
-from volery.autonomy.swarm.particle_swarm import FlockLimits, accelerate, best_acceleration
+from volery.autonomy.swarm.particle_swarm import (
+    FlockLimits,
+    accelerate,
+    best_acceleration,
+    margin_between,
+)
 from volery.core.arrays import Array
+from volery.core.compiled import kernel
 from volery.core.rng import stream_key
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
@@ -35,8 +43,7 @@ _HAS_POSITION = 0.9
 """Upwash of a bird that has a position."""
 _AHEAD = 60
 """Steps of a trajectory to an end."""
-
-
+_ROUNDING = 1e-9
 _SLOWEST = 0.05
 """Speed, wing spans per step, below which no bird flies: it could not accelerate again."""
 _CHANGES = np.array(
@@ -193,9 +200,7 @@ class MemberPlanner(SavedAttributes):
         speed = np.linalg.norm(velocity, axis=1)
         velocity *= np.minimum(1.0, limits.max_speed / np.maximum(speed, 1e-12))[:, None]
         nearest, velocity = velocity[0], velocity[speed >= _SLOWEST]
-        others = [row for row in range(flock.shape[1]) if row != me]
-        offset = flock[:2, me] - flock[:2, others].T
-        margin = _margins(offset, velocity[:, None] - flock[2:, others].T, limits.min_distance)
+        margin = _margins(flock, me, velocity, limits.min_distance)
         if (margin < 0.0).all():
             return np.array(velocity[int(np.argmax(margin))])
         away = np.linalg.norm(velocity - nearest, axis=1)
@@ -209,14 +214,20 @@ def _shortened(vector: Array, length: float) -> Array:
     return vector * min(1.0, length / max(norm(vector), 1e-12))
 
 
-def _margins(offset: Array, velocity: Array, min_distance: float) -> Array:
-    """Returns how far (C,) birds stay out of a distance in a step; negative: too near.
+@kernel
+def _margins(flock: Any, me: int, velocities: Any, min_distance: float) -> Any:
+    """Returns how far a bird with velocities (C, 2) stays out of a distance in a step, (C,).
 
-    offset: (N, 2) of the bird from the others. velocity: (C, N, 2), relative. Two that are nearer
-    at the beginning must only not approach.
+    From the others of the flock (4, N); negative: too near. See `margin_between`.
     """
-    square = np.maximum((velocity * velocity).sum(axis=-1), 1e-12)
-    time = np.clip(-(velocity * offset).sum(axis=-1) / square, 0.0, 1.0)
-    nearest = np.linalg.norm(offset + time[..., None] * velocity, axis=-1)
-    allowed = np.minimum(min_distance, np.linalg.norm(offset, axis=-1))
-    return np.asarray((nearest - allowed + 1e-9).min(axis=-1, initial=np.inf))
+    margins = np.full(len(velocities), np.inf)
+    for c in range(len(velocities)):
+        for j in range(flock.shape[1]):
+            if j == me:
+                continue
+            x, y = flock[0, me] - flock[0, j], flock[1, me] - flock[1, j]
+            after_x = x + velocities[c, 0] - flock[2, j]
+            after_y = y + velocities[c, 1] - flock[3, j]
+            margin = margin_between(x, y, after_x, after_y, min_distance)
+            margins[c] = min(margins[c], margin + _ROUNDING)
+    return margins

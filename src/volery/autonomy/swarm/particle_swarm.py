@@ -118,11 +118,7 @@ def best_accelerations(
     """
     count = start.shape[1]
     best[:] = 0.0
-    flock, swarm = _new_flock(count), _new_swarm(num_particles)
-    for i in range(count):
-        accelerate(start, i, 0.0, 0.0, horizon, limits.max_speed, flock.moved)
-    for i in range(count):
-        _compare(flock, i)
+    flock, swarm = _flown_straight(start, horizon, limits), _new_swarm(num_particles)
     order, benefit = np.arange(count), np.empty(count)
     cost = math.inf
     for _ in range(_MAX_ROUNDS):
@@ -156,11 +152,7 @@ def best_acceleration(
     `best_accelerations`; the cost is infinite where each acceleration comes too near to another.
     """
     count = start.shape[1]
-    flock, swarm = _new_flock(count), _new_swarm(num_particles)
-    for j in range(count):
-        accelerate(start, j, 0.0, 0.0, horizon, limits.max_speed, flock.moved)
-    for j in range(count):
-        _compare(flock, j)
+    flock, swarm = _flown_straight(start, horizon, limits), _new_swarm(num_particles)
     found = np.zeros((2, count))
     cost, counter = _search(
         start, i, horizon, limits, flock, swarm, np.empty(count), key, counter, found
@@ -170,9 +162,16 @@ def best_acceleration(
 
 
 @owning_kernel
-def _new_flock(count: int) -> _Flock:
+def _flown_straight(start: Any, horizon: int, limits: FlockLimits) -> _Flock:
+    """Returns the flock after a look-ahead in which all birds fly straight."""
+    count = start.shape[1]
     square = count, count
-    return _Flock(np.empty((4, count)), np.zeros(square), np.zeros(square), np.zeros(square))
+    flock = _Flock(np.empty((4, count)), np.zeros(square), np.zeros(square), np.zeros(square))
+    for i in range(count):
+        accelerate(start, i, 0.0, 0.0, horizon, limits.max_speed, flock.moved)
+    for i in range(count):
+        _compare(flock, i)
+    return flock
 
 
 @owning_kernel

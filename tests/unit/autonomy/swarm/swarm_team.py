@@ -1,4 +1,4 @@
-"""A team of UAVs under a node of the swarm."""
+"""UAVs under nodes of the swarm."""
 
 import json
 
@@ -10,20 +10,15 @@ from volery.graph.messages import Twist
 PERIOD_S = 0.05
 
 
-class SwarmTeam(NodeBench):
-    """UAVs at positions (N, 3) m that follow their velocity commands at once.
+class ObedientUavs(NodeBench):
+    """UAVs at positions (N, 3) m that follow their velocity commands at once."""
 
-    The node flies all of them, unless its parameter `uavs` names others.
-    """
-
-    def __init__(self, node, positions, **parameters):
+    def __init__(self, positions):
         super().__init__()
         self.positions = np.array(positions, float)
         self.names = [f"uav{k + 1}" for k in range(len(self.positions))]
         self.velocities = np.zeros_like(self.positions)
         self.silent = set()
-        self.node = self.start(node, **{"uavs": self.names} | parameters)
-        self.statuses = self.listen(f"{self.node.full_name}/status")
         for row, name in enumerate(self.names):
             topic = f"/{name}/cmd_vel"
             self.graph.subscribe(topic, lambda p, row=row: self._obey(row, p.message), Twist)
@@ -40,6 +35,18 @@ class SwarmTeam(NodeBench):
                     at = odometry(time_ns, self.positions[row], self.velocities[row])
                     self.send(f"/{name}/odom", at)
             self.run_to(time_ns)
+
+
+class SwarmTeam(ObedientUavs):
+    """A team under one node.
+
+    The node flies all of them, unless its parameter `uavs` names others.
+    """
+
+    def __init__(self, node, positions, **parameters):
+        super().__init__(positions)
+        self.node = self.start(node, **{"uavs": self.names} | parameters)
+        self.statuses = self.listen(f"{self.node.full_name}/status")
 
     @property
     def status(self):

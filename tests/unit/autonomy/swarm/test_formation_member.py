@@ -4,7 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from node_bench import NodeBench, odometry
+from node_bench import NodeBench
+from swarm_team import ObedientUavs
 
 from volery.autonomy.swarm.formation_fitness import fitness_cost, formation_fitness
 from volery.autonomy.swarm.formation_member import FormationMember, MemberPhase
@@ -13,11 +14,10 @@ from volery.autonomy.swarm.particle_swarm import FlockLimits
 from volery.autonomy.swarm.random_start import random_start
 from volery.core.errors import PlanError
 from volery.graph.codecs.zero import zero_message
-from volery.graph.messages import Twist, message_type
+from volery.graph.messages import message_type
 
 LIMITS = FlockLimits(1.0, 2.67, 1.33)
 REPORT = message_type("volery_interfaces/msg/TeamReport")
-PERIOD_S = 0.05
 
 
 def fly(count, seed, steps=150):
@@ -86,15 +86,12 @@ def test_a_bird_at_rest_flies_off_and_one_without_a_heading_of_its_flock_goes_on
     assert 0.05 <= np.linalg.norm(velocity) <= 0.2
 
 
-class Team(NodeBench):
-    """UAVs in a row, 10 m apart, that follow commands at once, each with a node of its own."""
+class Team(ObedientUavs):
+    """UAVs in a row, 10 m apart, each with a node of its own; the bench is their radio."""
 
     def __init__(self, count=7, start_m=(0.0, 0.0), **parameters):
-        super().__init__()
-        self.names = [f"uav{k + 1}" for k in range(count)]
-        self.positions = np.array([[10.0 * (k - (count - 1) / 2), 0.0, 5.0] for k in range(count)])
-        self.velocities = np.zeros_like(self.positions)
-        self.silent, self.deaf = set(), set()
+        super().__init__([[10.0 * (k - (count - 1) / 2), 0.0, 5.0] for k in range(count)])
+        self.deaf = set()
         self.lost_reports = 0.0
         self._rng = np.random.default_rng(1)
         self.nodes, self.statuses = [], []
@@ -106,29 +103,13 @@ class Team(NodeBench):
             )
             self.nodes.append(node)
             self.statuses.append(self.listen(f"/{name}/formation_member/status"))
-            self.graph.subscribe(
-                f"/{name}/cmd_vel", lambda p, row=row: self._obey(row, p.message), Twist
-            )
             self.graph.subscribe(f"/{name}/team", lambda p, row=row: self._relay(row, p.message))
         self._ears = [self.graph.advertise(f"/{name}/radio/team", REPORT) for name in self.names]
-
-    def _obey(self, row, twist):
-        self.velocities[row] = twist.linear.x, twist.linear.y, twist.linear.z
 
     def _relay(self, sender, report):
         for row, ear in enumerate(self._ears):
             if row != sender and row not in self.deaf and self._rng.random() >= self.lost_reports:
                 ear.publish(report)
-
-    def fly(self, seconds):
-        for _ in range(round(seconds / PERIOD_S)):
-            time_ns = self.now_ns + round(PERIOD_S * 1e9)
-            self.positions += self.velocities * PERIOD_S
-            for row, name in enumerate(self.names):
-                if row not in self.silent:
-                    at = odometry(time_ns, self.positions[row], self.velocities[row])
-                    self.send(f"/{name}/odom", at)
-            self.run_to(time_ns)
 
     def cost(self, rows=None):
         """Returns the cost of the formation that the UAVs fly in."""
