@@ -14,7 +14,7 @@ from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.perception.map_frame import MapFrame
 from volery.autonomy.planning.exploration_node import POLYGON, Exploration
 from volery.autonomy.planning.global_planner import GlobalPlanner
-from volery.autonomy.planning.local_planner import PUSHED, LocalPlanner
+from volery.autonomy.planning.local_planner import PUSHED, TOO_DISTURBED, LocalPlanner
 from volery.autonomy.planning.neighbours import Neighbours
 from volery.autonomy.planning.primitives import PrimitivePath, PrimitiveState
 from volery.autonomy.planning.tracking_error import TrackingError
@@ -126,6 +126,22 @@ def test_a_uav_that_is_pushed_off_its_plans_keeps_more_distance_at_less_speed():
     assert pushed.limits.speed < 2.9
     glade.go_on(1.0, odom=False)
     assert glade.node._tracking.largest_m <= off_m  # an old pose says nothing
+
+
+def test_a_uav_that_is_pushed_too_far_holds_and_says_why():
+    glade = Glade(speed_m_s=3.0)
+    glade.go_on(1.0)
+    glade.bench.send("/uav1/planning/path", path((0.0, 0.0), (9.0, 0.0)))
+    for _ in range(20):  # the bench's UAV does not move
+        glade.go_on(0.5)
+        if last_status(glade.status)["state"] == "holding":
+            break
+    assert last_status(glade.status)["problems"] == [TOO_DISTURBED]
+    samples = samples_of(glade.plans[-1])
+    np.testing.assert_allclose(samples.velocity[-1], 0.0, atol=1e-9)
+    held = len(glade.status)
+    glade.go_on(40.0)  # at rest it is where it plans to be, until it plans to fly again
+    assert "flying" in {json.loads(status.data)["state"] for status in glade.status[held:]}
 
 
 def test_deviations_are_forgotten_in_calm_air():
