@@ -84,6 +84,16 @@ def cross(source, command):
         source.run(0.4)
 
 
+def flying_on(uav):
+    """A wreck refuses commands; environments leave it out of them."""
+
+    def command(velocity):
+        with contextlib.suppress(CommandError):
+            uav.command_velocity(velocity)
+
+    return command
+
+
 def measured(envs, env):
     """States and last samples of one environment, and where it hit something."""
     state = envs.state()
@@ -153,6 +163,29 @@ def test_an_environment_equals_the_simulation_of_its_world():
             np.testing.assert_array_equal(found[env]["horizontal.echoes"], scan.echoes)
             np.testing.assert_array_equal(found[env]["camera.colour"], image.image)
             np.testing.assert_array_equal(found[env]["camera.depth"], image.depth)
+
+
+def test_contacts_between_ticks_are_those_of_the_simulation():
+    """Without sensors, whose samples end ticks."""
+    own = scenario().with_({"types.f450.sensors": []})
+    with VectorizedSimulation(own, 3, seeds=[5, 6, 7], threads=1, worlds=WORLDS) as envs:
+        fly(envs, None)
+        cross(envs, envs.command_velocity)
+        state, hits = envs.state(), [(e.env, e.event.time_ns) for e in envs.drain_events()]
+    assert state.crashed.any()
+    for env, seed in enumerate((5, 6, 7)):
+        alike = own.with_(seed=seed, world={"seed": WORLDS[env]})
+        with Simulation(alike, threads=1) as simulation:
+            simulation.run(TAKE_OFF_S)
+            for _ in range(2):
+                cross(simulation, flying_on(simulation.uavs["uav1"]))
+            single = simulation._engine.fleet.state
+            times = [event.time_ns for event in simulation.diagnostics.events]
+        assert_same(
+            {name: getattr(state, name)[env] for name in STATES},
+            {name: getattr(single, name) for name in STATES},
+        )
+        assert [time for number, time in hits if number == env] == times
 
 
 def test_a_reset_moves_environments_to_other_worlds(flown):

@@ -29,8 +29,10 @@ def test_one_rotation_is_to_the_bit_what_it_is_among_many(seed: int) -> None:
     p, q = (rotations.normalize(random.normal(size=(5, 4))) for _ in range(2))
     v = random.normal(size=(5, 3))
     products, turned = rotations.multiply(p, q), rotations.rotate(p, v)
-    turns = rotations.exponential(v)
+    turns, matrices = rotations.exponential(v), rotations.matrix(p)
     for i in range(5):
+        assert rotations.matrix(p[i]).tolist() == matrices[i].tolist()
+        np.testing.assert_allclose(matrices[i] @ v[i], turned[i], atol=1e-14)
         assert rotations.multiply(p[i], q[i]).tolist() == products[i].tolist()
         assert rotations.rotate(p[i], v[i]).tolist() == turned[i].tolist()
         assert rotations.exponential(v[i]) == pytest.approx(turns[i], abs=1e-15)

@@ -180,6 +180,16 @@ def test_a_team_waits_a_minute_for_one_that_it_does_not_hear():
     assert all(node.phase in (MemberPhase.SEARCH, MemberPhase.JOIN) for node in team.nodes[:2])
 
 
+def test_a_displaced_uav_flies_on_from_where_it_is():
+    team = Team(count=2)
+    team.fly_until(lambda: team.nodes[0].phase is MemberPhase.SEARCH)
+    team.positions[0] += [0.0, 12.0, 0.0]
+    displaced = team.positions[0].copy()
+    team.fly(1.2)
+    assert np.linalg.norm(team.positions[0] - displaced) < 3.0
+    assert np.linalg.norm(team.nodes[0]._bird_at(team.now_ns) - team.positions[0, :2]) < 4.5
+
+
 def test_reports_that_make_no_sense_are_refused():
     team = Team(count=2)
     bad = {
