@@ -46,8 +46,11 @@ MAX_UNUSED = 1000
 class _Listener:
     """A callback for all matching topics."""
 
-    def __init__(self, callback: Callback, matches: Callable[[str], bool]) -> None:
+    def __init__(
+        self, callback: Callback, matches: Callable[[str], bool], *, is_machine: bool
+    ) -> None:
         self.matches = matches
+        self.is_machine = is_machine
         self._callback = callback
 
     def __call__(self, published: Published) -> None:
@@ -130,6 +133,8 @@ class Graph:
         """Publisher of the message that is being delivered; None: none is."""
         self.changes = 0
         """Number of changes of publishers and subscriptions so far."""
+        self._passive_topic = ""
+        """Topic whose passive subscriber is being called; empty: none is."""
         self._members = threading.RLock()
         """Guards changes of topics, publishers, subscribers and services."""
 
@@ -161,6 +166,10 @@ class Graph:
     def is_recorded(self, topic: str) -> bool:
         """Returns whether a recorder or digest receives the messages of a topic."""
         return any(listener.matches(topic) for listener in self._to_all)
+
+    def must_cross(self, topic: str) -> bool:
+        """Returns whether another machine of a divided run receives the messages of a topic."""
+        return any(each.is_machine and each.matches(topic) for each in self._to_all)
 
     def advertise(
         self,
@@ -201,10 +210,14 @@ class Graph:
         msgtype: str | type[Any] | None = None,
         *,
         qos: QoSProfile = DEFAULT_QOS,  # noqa: ARG002
+        passive: bool = False,
     ) -> Subscription:
         """Calls `callback` with each message of `topic`.
 
         Without `msgtype`, the topic must exist. As for `advertise`, the type prevails.
+
+        passive: the callback publishes and calls nothing (which raises `GraphError` then), so that
+        the machines of a divided run need not meet for its messages.
 
         qos: affects only messages that have to wait, which never happens in lock step. The next
         delivery starts with the messages that latched publishers sent before; their `time_ns` is
@@ -212,10 +225,19 @@ class Graph:
         """
         with self._members:
             found = self._decided_topic(topic, self._type_of(topic, msgtype))
+            if passive:
+                callback = self._passive(callback)
+                found.passive.append(callback)
             found.callbacks.append(callback)
             self.changes += 1
+
+        def leave() -> None:
+            if passive:
+                found.passive.remove(callback)
+            self._drop_unused(found)
+
         self._send_latched([found], callback)
-        return Subscription(found.callbacks, callback, lambda: self._drop_unused(found))
+        return Subscription(found.callbacks, callback, leave)
 
     def attach(
         self,
@@ -249,16 +271,21 @@ class Graph:
         return Subscription(found.callbacks, callback, leave)
 
     def subscribe_all(
-        self, callback: Callback, matches: Callable[[str], bool] | None = None
+        self,
+        callback: Callback,
+        matches: Callable[[str], bool] | None = None,
+        *,
+        is_machine: bool = False,
     ) -> Subscription:
         """Calls `callback` with every message, before the subscribers of the topic.
 
         Latched messages come first, as for `subscribe`.
 
         matches: returns whether to receive a topic, given its name; without it, all topics. No
-        messages are built for it on other topics.
+        messages are built for it on other topics. is_machine: it passes them to another machine of
+        a divided run; see `must_cross`.
         """
-        listener = _Listener(callback, matches or _match_all)
+        listener = _Listener(callback, matches or _match_all, is_machine=is_machine)
         self._to_all.append(listener)
         self.count_change()
         meant = [topic for topic in self._topics.values() if listener.matches(topic.name)]
@@ -300,6 +327,7 @@ class Graph:
 
     def enqueue(self, sender: Publisher, topic: Topic, message: Any) -> None:
         """Queues a message; used by `Publisher`."""
+        self._check_may_act(f"publishes on '{topic.name}'")
         sender.check(message)
         topic.messages += 1
         if sender.has_subscribers:
@@ -440,6 +468,25 @@ class Graph:
         finally:
             self._queue.extend(reversed(after))
 
+    def _passive(self, callback: Callback) -> Callback:
+        """Returns the callback of a subscriber that publishes and calls nothing."""
+
+        def receive(published: Published) -> None:
+            before, self._passive_topic = self._passive_topic, published.topic
+            try:
+                callback(published)
+            finally:
+                self._passive_topic = before
+
+        return receive
+
+    def _check_may_act(self, action: str) -> None:
+        if self._passive_topic:
+            raise GraphError(
+                f"a subscription of '{self._passive_topic}' is declared passive, but its callback "
+                f"{action}: publish and call in a timer, or omit passive=True"
+            )
+
     def _drop_unused(self, topic: Topic) -> None:
         """Removes the oldest unused topic when there are more than MAX_UNUSED."""
         with self._members:
@@ -549,6 +596,7 @@ class Graph:
 
     def call(self, service: str, request: Any | None = None) -> Any:
         """Calls a service and returns its response. Raises `GraphError` if it has no server."""
+        self._check_may_act(f"calls '{service}'")
         found = self._service(service)
         if found.handler is None:
             raise GraphError(f"service '{service}' has an external server: use call_async")
@@ -556,6 +604,7 @@ class Graph:
 
     def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Calls a service that may respond later. Raises `GraphError` if it has no server."""
+        self._check_may_act(f"calls '{service}'")
         found = self._service(service)
         found.async_handler(_request(found, request), reply)
 

@@ -35,6 +35,7 @@ class Topic:
         self.recorders: tuple[Callback, ...] = ()  # those of the graph that receive the topic, ...
         self.seen_changes = -1  # ... at this number of the graph's changes
         self.external: list[Callback] = []  # the callbacks that other threads have attached
+        self.passive: list[Callback] = []  # the callbacks that publish and call nothing
         self.on_ended: list[Callable[[str], None]] = []  # learn why external subscriptions end
         self.num_attached = 0  # number of external subscriptions so far
         self.publishers = 0
@@ -55,6 +56,11 @@ class Topic:
         """Whether its type cannot change: it has a publisher, or a subscriber of the simulation."""
         return bool(self.publishers or len(self.callbacks) > len(self.external))
 
+    @property
+    def has_acting_subscribers(self) -> bool:
+        """Whether a subscriber of the simulation may publish or call when it receives a message."""
+        return len(self.callbacks) > len(self.external) + len(self.passive)
+
     def end(self, reason: str) -> None:
         """Notifies the external subscribers that they will receive no message."""
         for on_end in tuple(self.on_ended):
@@ -69,6 +75,9 @@ class _Delivery(Protocol):
 
     def is_recorded(self, topic: str) -> bool:
         """Returns whether a recorder or digest receives the messages of a topic."""
+
+    def must_cross(self, topic: str) -> bool:
+        """Returns whether another machine of a divided run receives the messages of a topic."""
 
     def enqueue(self, sender: Publisher, topic: Topic, message: Any) -> None:
         """Queues a message."""
@@ -147,6 +156,15 @@ class Publisher:
     def has_internal_subscribers(self) -> bool:
         """Whether a node of the simulation subscribes to this topic by name."""
         return len(self._topic.callbacks) > len(self._topic.external)
+
+    @property
+    def causes_actions(self) -> bool:
+        """Whether a message may have others follow at its instant, or crosses to another machine.
+
+        Subscribers of other threads respond later, with commands.
+        """
+        topic = self._topic
+        return topic.has_acting_subscribers or self._graph.must_cross(topic.name)
 
     @property
     def has_external_subscribers(self) -> bool:

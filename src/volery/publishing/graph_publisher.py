@@ -169,9 +169,10 @@ class GraphPublisher:
         last = len(rows)
         self._static.sort(key=lambda t: rows.get(t.child_frame_id.split("/")[0], last))
 
-    def has_receivers(self, sensors: Sequence[SensorId]) -> bool:
-        """Returns whether a message of any of these sensors would be delivered."""
-        return self._tf.has_subscribers or any(map(self._has_receiver, sensors))
+    def causes_actions(self, sensors: Sequence[SensorId]) -> bool:
+        """Returns whether a message of any of these sensors causes actions; see `Publisher`."""
+        publishers = (each for sensor in sensors for each in self._of_sensor.get(sensor.path, ()))
+        return self._tf.causes_actions or any(each.causes_actions for each in publishers)
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's sensors, and removes its static transforms."""

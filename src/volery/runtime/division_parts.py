@@ -20,7 +20,8 @@ class DivisionParts(NamedTuple):
     commands: CommandLog
     repeater: CommandRepeater
     """Repeats the commands that a leader's clients give."""
-    has_receivers: Callable[[SensorBank], bool]
-    """Returns whether messages of a bank's sensors are delivered on this machine."""
+    causes_actions: Callable[[SensorBank], bool]
+    """Returns whether nodes of this machine may act on messages of a bank's sensors, or other
+    machines receive them."""
     nodes: Callable[[], Sequence[Node]]
     """Returns the nodes of this machine."""

@@ -326,7 +326,7 @@ class Simulation(Uncopied):
                 graph,
                 self.commands,
                 repeater,
-                lambda bank: manager.publisher.has_receivers(bank.sensors),
+                lambda bank: manager.publisher.causes_actions(bank.sensors),
                 lambda: tuple(manager.nodes),
             )
         )

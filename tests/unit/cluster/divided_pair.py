@@ -72,19 +72,46 @@ class Weaver(Node):
         self.commands.publish(Twist(Vector3(speed, 0.1, 0.0), Vector3(0.0, 0.0, 0.2)))
 
 
-def scenario_of(count=3, **parameters):
+class Listener(Node):
+    """Stores what it receives, and flies by it every .1 s; `starts` a timer too early, if asked."""
+
+    def __init__(self):
+        super().__init__("listener")
+        self.starts = self.declare_parameter("starts", False).value
+        self.seen, self.north = 0.0, 0.0
+        self.commands = self.create_publisher(Twist, "cmd_vel", 10)
+        self.create_subscription(LaserScan, "laser/horizontal/scan", self.on_scan, 5, passive=True)
+        self.create_subscription(Odometry, "odom", self.on_odometry, 5, passive=True)
+        self.create_timer(0.1, self.on_timer)
+
+    def on_scan(self, scan):
+        finite = scan.ranges[np.isfinite(scan.ranges)]
+        self.seen = float(finite.sum()) if len(finite) else 0.0
+
+    def on_odometry(self, odometry):
+        self.north = odometry.pose.pose.position.y
+        if self.starts:
+            self.create_timer(0.013, self.on_timer)
+            self.starts = False
+
+    def on_timer(self):
+        speed = 0.3 * np.sin(0.1 * self.seen) + 0.1 * self.north
+        self.commands.publish(Twist(Vector3(speed, 0.1, 0.0), Vector3(0.0, 0.0, 0.2)))
+
+
+def scenario_of(count=3, node="Weaver", **parameters):
     """Returns a scenario of `count` UAVs that see each other."""
     lidar = {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]}
     camera = {"kind": "camera", "name": "eye", "width": 16, "height": 12, "rate_hz": 10.0}
     sensors = [lidar, camera, {"kind": "imu"}, {"kind": "odometry"}]
-    node = {"node": f"{HERE}:Weaver", "parameters": parameters}
+    entry = {"node": f"{HERE}:{node}", "parameters": parameters}
     row = {"type": "weaver", "count": count, "position_m": [0.0, 0.0]}
     row |= {"last_position_m": [3.0 * (count - 1), 0.0], "on_start": "take_off"}
     flight = {"take_off_altitude_m": 0.6}
     return parse_scenario(
         {
             "name": "weaving",
-            "types": {"weaver": {"flight": flight, "sensors": sensors, "nodes": [node]}},
+            "types": {"weaver": {"flight": flight, "sensors": sensors, "nodes": [entry]}},
             "uavs": [row],
         }
     )

@@ -1,5 +1,6 @@
 """Divided runs: the same states and messages as on one machine, whatever the clients do."""
 
+import numpy as np
 import pytest
 from divided_pair import DividedPair, scenario_of
 
@@ -154,6 +155,25 @@ def test_what_has_no_subscribers_does_not_cross():
         pair.division._inbox.apply = noted
         pair.simulation.run(0.3)
     assert set(crossed) == {"/uav3/cmd_vel"}
+
+
+def test_machines_do_not_meet_for_messages_of_passive_subscriptions():
+    scenario = scenario_of(node="Listener")
+    alone, together = both(scenario)
+    assert together == alone
+    with DividedPair(scenario) as pair:  # without a digest, which has all messages cross
+        pair.simulation.run(2.05)
+        assert 20 <= pair.division._exchanges < 26  # timers, events, and the end
+        found = pair.simulation._engine.fleet.state.position_map.copy()
+    with Simulation(scenario, threads=1) as simulation:
+        simulation.run(2.05)
+        np.testing.assert_array_equal(found, simulation._engine.fleet.state.position_map)
+
+
+def test_a_passive_subscription_cannot_start_timers_in_a_divided_run():
+    failing = pytest.raises(VoleryError, match=r"a timer is due between two barriers.*passive")
+    with DividedPair(scenario_of(node="Listener", starts=True)) as pair, failing:
+        pair.simulation.run(0.5)
 
 
 def test_the_part_of_a_lost_worker_is_repeated_and_goes_on():

@@ -7,7 +7,7 @@ import pytest
 from divided_pair import scenario_of
 
 from volery.cluster.division.job import DivisionJob, files_of
-from volery.cluster.division.partitioning import _groups, divided
+from volery.cluster.division.partitioning import _groups, _shares, divided
 from volery.core.errors import DataFileError, DivisionError, ScenarioError
 from volery.graph.nodes.handles import NodeEndpoints
 from volery.scenario.load import load_scenario, parse_scenario
@@ -27,8 +27,31 @@ def sizes(scenario, machines):
 def test_uavs_are_divided_evenly_and_in_fleet_order():
     scenario = scenario_of(7)
     assert sizes(scenario, 2) == [4, 3]
-    assert sizes(scenario, 3) == [3, 2, 2]
+    assert sizes(scenario, 3) == [2, 3, 2]
     assert divided(scenario, 2)[1] == {"uav5", "uav6", "uav7"}
+
+
+def test_uavs_are_divided_by_the_cost_of_their_sensors():
+    camera = {"kind": "camera", "name": "wide", "width": 320, "height": 240, "rate_hz": 60.0}
+    scenario = scenario_of(9)
+    types = scenario.data()["types"]
+    heavy = types["weaver"] | {"sensors": [*types["weaver"]["sensors"], camera]}
+    rows = [
+        {"type": kind, "count": count, "position_m": [0.0, y], "last_position_m": [9.0, y]}
+        for kind, count, y in (("weaver", 8, 0.0), ("heavy", 2, 5.0))
+    ]
+    mixed = scenario.with_(types=types | {"heavy": heavy}, uavs=rows)
+    first, second = divided(mixed, 2)
+    assert "uav10" in second
+    assert len(first) >= 8
+
+
+def test_shares_have_nearly_the_same_cost():
+    assert _shares([1.0] * 8, 2, 0.0, first_is_used=False) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+    assert _shares([9.0, 1.0, 1.0], 3, 0.0, first_is_used=False) == [[0], [1], [2]]
+    assert _shares([1.0, 1.0, 9.0], 3, 0.0, first_is_used=False) == [[0], [1], [2]]
+    assert _shares([2.0, 2.0, 2.0], 2, 5.0, first_is_used=True) == [[], [0, 1, 2]]
+    assert _shares([1.0, 5.0, 1.0, 1.0], 2, 0.0, first_is_used=False) == [[0, 1], [2, 3]]
 
 
 def test_too_few_uavs_are_refused():

@@ -39,6 +39,46 @@ def test_unwanted_messages_are_not_queued_and_publishers_know_their_subscribers(
     assert publisher.has_subscribers
 
 
+def test_passive_subscribers_cause_no_actions(graph):
+    publisher, other = graph.advertise("/a", String), graph.advertise("/b", String)
+    got = []
+    passive = graph.subscribe("/a", got.append, passive=True)
+    graph.attach("/a", got.append)
+    graph.subscribe_all(got.append)
+    assert not publisher.causes_actions
+    publisher.publish(String("1"))
+    graph.deliver()
+    assert len(got) == 3
+    active = graph.subscribe("/a", lambda _m: other.publish(String("reply")))
+    assert publisher.causes_actions
+    active.cancel()
+    assert not publisher.causes_actions
+    graph.subscribe_all(got.append, lambda topic: topic == "/a", is_machine=True)
+    assert publisher.causes_actions
+    assert not other.causes_actions
+    passive.cancel()
+    publisher.publish(String("2"))
+    graph.deliver()
+    assert len(got) == 6
+
+
+def test_passive_subscribers_that_act_are_refused(graph):
+    publisher, other = graph.advertise("/a", String), graph.advertise("/b", String)
+    graph.create_service("/c", "std_srvs/srv/Trigger", lambda request: request)
+    for action, text in (
+        (lambda _m: other.publish(String("reply")), "publishes on '/b'"),
+        (lambda _m: graph.call("/c"), "calls '/c'"),
+        (lambda _m: graph.call_async("/c", None, None), "calls '/c'"),
+    ):
+        subscription = graph.subscribe("/a", action, passive=True)
+        publisher.publish(String("1"))
+        with pytest.raises(GraphError, match=f"'/a' is declared passive, but its callback {text}"):
+            graph.deliver()
+        subscription.cancel()
+    other.publish(String("still"))
+    graph.deliver()
+
+
 def test_publication_carries_time_type_and_bytes(graph):
     publisher = graph.advertise("/a", String)
     got = []

@@ -72,9 +72,10 @@ class DepthCourse(SavedAttributes, Node):
         self._image_ns: int | None = None
         self._info: CameraInfo | None = None
 
-        self.create_subscription(Odometry, "odom", self._on_odometry, 5)
-        self.create_subscription(CameraInfo, f"{camera}/camera_info", self._on_info, 1)
-        self.create_subscription(Image, f"{camera}/depth", self._on_image, 1)
+        self.create_subscription(Odometry, "odom", self._on_odometry, 5, passive=True)
+        info, depth = f"{camera}/camera_info", f"{camera}/depth"
+        self.create_subscription(CameraInfo, info, self._on_info, 1, passive=True)
+        self.create_subscription(Image, depth, self._on_image, 1, passive=True)
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
         self._status = self.create_publisher(String, "~/phase", 1)
         self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
@@ -83,7 +84,7 @@ class DepthCourse(SavedAttributes, Node):
 
     @abstractmethod
     def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:
-        """Processes a depth image."""
+        """Processes a depth image; publishes and calls nothing."""
 
     @abstractmethod
     def steer(self, pose: OdometrySample) -> tuple[Array, float]:

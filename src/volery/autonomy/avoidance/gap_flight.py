@@ -82,11 +82,14 @@ class GapFlight(SavedAttributes, Node):
         self._low_obstacles = ObstacleMemory(half_width_m=10.0, looks_needed=3)
         self._level_filter, self._nodding_filter = SpeckleFilter(), SpeckleFilter()
 
-        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
-        self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_level_scan, 5)
-        self.create_subscription(LaserScan, "laser/nodding/scan", self._on_nodding_scan, 5)
-        self.create_subscription(JointState, "joint_states", self._on_joint, 5)
-        self.create_subscription(Range, "range", self._on_range, 5)
+        for kind, topic, update in (
+            (Odometry, odometry, self._on_odometry),
+            (LaserScan, "laser/horizontal/scan", self._on_level_scan),
+            (LaserScan, "laser/nodding/scan", self._on_nodding_scan),
+            (JointState, "joint_states", self._on_joint),
+            (Range, "range", self._on_range),
+        ):
+            self.create_subscription(kind, topic, update, 5, passive=True)
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
 
     @property

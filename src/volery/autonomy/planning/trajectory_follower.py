@@ -67,7 +67,7 @@ class TrajectoryFollower(SavedAttributes, Node):
         self._paused = False
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
-        self.create_subscription(Odometry, odometry, self._on_odometry, 5)
+        self.create_subscription(Odometry, odometry, self._on_odometry, 5, passive=True)
         self.create_subscription(
             MultiDOFJointTrajectory, "planning/trajectory", self._on_trajectory, 2
         )

@@ -65,6 +65,7 @@ class MirroredGraph(Graph):
         msgtype: str | type[Any] | None = None,
         *,
         qos: QoSProfile = DEFAULT_QOS,
+        passive: bool = False,  # noqa: ARG002
     ) -> Subscription:
         """Calls `callback` with each message of the connection.
 

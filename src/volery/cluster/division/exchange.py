@@ -50,7 +50,7 @@ class Outbox:
         self._declared: Collection[str] | None = frozenset()
         self._matching: frozenset[str] = frozenset()
         self._seen_changes = -1
-        self._tap = graph.subscribe_all(self._take, self._is_wanted)
+        self._tap = graph.subscribe_all(self._take, self._is_wanted, is_machine=True)
         graph.on_node_call = self.call
 
     def want(self, wanted: Collection[str], declared: Collection[str] | None = None) -> None:

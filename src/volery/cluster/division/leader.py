@@ -15,7 +15,7 @@ from typing import Any
 
 import cbor2
 
-from volery.cluster.division.barriers import Barriers
+from volery.cluster.division.barriers import Barriers, Due
 from volery.cluster.division.exchange import (
     BATCH,
     CALL,
@@ -46,8 +46,8 @@ class Member:
         self.link = link
         self.uavs = uavs
         """UAVs that it serves."""
-        self.due = 0
-        """Step at which something is due there."""
+        self.due = Due(0, 0)
+        """Steps at which something is due there."""
         self.timers = False
         """Whether timers are due there in the present tick."""
         self.topics: dict[str, Any] = {}
@@ -81,9 +81,9 @@ class Member:
         for _ in range(self._num_sent):
             yield self._history.read(int.from_bytes(self._history.read(_SIZE_BYTES), "big"))
 
-    def update(self, due: int, news: dict[str, Any]) -> None:
+    def update(self, due: Sequence[int], news: dict[str, Any]) -> None:
         """Takes over a worker's description of itself."""
-        self.due = due
+        self.due = Due(*due)
         if news:
             self.topics, self.services = news["topics"], news["services"]
             self.subscribed = frozenset(news["subscribed"])
@@ -137,13 +137,14 @@ class Leader:
             final = not any(
                 news[member] or _may_respond(member, items) for member, items in pending.items()
             )
-            due = min([last_step, barriers.due_step(), *(member.due for member in self._members)])
-            next_step = max(due, self._engine.fleet.step)
+            dues = [barriers.due(), *(member.due for member in self._members)]
+            next_step = max(min(last_step, *(due.first for due in dues)), self._engine.fleet.step)
+            has_sensors = any(due.sensors <= next_step for due in dues)
             for member, items in pending.items():
-                frame = [TICK, items, final, next_step, news[member]]
+                frame = [TICK, items, final, next_step, has_sensors, news[member]]
                 self._call_member(member, partial(_send, frame))
             if final:
-                barriers.close(next_step)
+                barriers.close(next_step, has_sensors=has_sensors)
             else:
                 self._receive()
         return min(last_step, barriers.next_step)
@@ -153,7 +154,7 @@ class Leader:
 
         If timers are due anywhere, passes it on before they are called; else it can wait.
         """
-        if not self._barriers.is_due():
+        if not self._barriers.has_responses():
             return
         self._has_responses = True
         self._send_early()
@@ -276,7 +277,7 @@ class Leader:
         self._seen_changes = -1
 
 
-def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
+def greeting_of(link: Link) -> tuple[Sequence[int], dict[str, Any]]:
     """Waits until a worker is ready; returns its description: see `Member.update`.
 
     Raises `DivisionError` if its part cannot start.
@@ -287,7 +288,7 @@ def greeting_of(link: Link) -> tuple[int, dict[str, Any]]:
     if kind != "ready" or len(rest) != 2:
         raise LinkError(f"{link.name} sends a broken frame")
     due, news = rest
-    return int(due), news
+    return due, news
 
 
 class PartError(DivisionError):

@@ -46,7 +46,7 @@ class Worker:
 
     def greet(self) -> None:
         """Sends what the leader must know before the first tick."""
-        self._link.send("ready", self._barriers.due_step(), self._news())
+        self._link.send("ready", self._barriers.due(), self._news())
 
     @property
     def at_barrier(self) -> bool:
@@ -64,9 +64,9 @@ class Worker:
             self._waiting = None
             if kind == "end":
                 raise RunEndedError(str(rest[0]))
-            if kind != TICK or len(rest) != 4:
+            if kind != TICK or len(rest) != 5:
                 raise LinkError(f"{self._link.name} sends a broken frame")
-            items, final, next_step, wishes = rest
+            items, final, next_step, has_sensors, wishes = rest
             self._left_to_repeat = max(0, self._left_to_repeat - 1)
             if wishes is not None:
                 known = frozenset(self._announced.get("topics", ()))
@@ -74,14 +74,14 @@ class Worker:
                 self._outbox.show_externally(wishes[1])
             self._inbox.apply(items)
             if final:
-                barriers.close(int(next_step))
+                barriers.close(int(next_step), has_sensors=bool(has_sensors))
             else:
                 self._send()
         return min(last_step, barriers.next_step)
 
     def exchange_responses(self) -> None:
         """At a barrier, sends what the nodes here have responded, and waits for the others."""
-        if not self._barriers.is_due():
+        if not self._barriers.has_responses():
             return
         self._has_responses = True
         self._send()
@@ -113,7 +113,7 @@ class Worker:
         own_hash = state_hash(self._engine.fleet, self._exchanges)
         self._exchanges += 1
         if not self._left_to_repeat:
-            due, timers = self._barriers.due_step(), self._barriers.has_timers()
+            due, timers = self._barriers.due(), self._barriers.has_timers()
             self._link.send(BATCH, items, due, timers, own_hash, self._news())
 
     def _news(self) -> dict[str, Any]:

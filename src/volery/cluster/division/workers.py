@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -169,7 +169,7 @@ class Workers:
                 raise DivisionError(f"a worker {ending}")
         raise DivisionError(f"a worker has not joined within {_START_S:.0f} s")
 
-    def _greeting_of(self, member: Member) -> tuple[int, dict[str, Any]]:
+    def _greeting_of(self, member: Member) -> tuple[Sequence[int], dict[str, Any]]:
         """Waits until a worker is ready; another one takes the part of one that cannot start."""
         while True:
             try:

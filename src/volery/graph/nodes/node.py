@@ -203,6 +203,7 @@ class Node(ParameterMethods):
         *,
         moves: Sequence[str] = (),
         raw: bool = False,
+        passive: bool = False,
         **_options: Any,
     ) -> NodeSubscription:
         """Calls `callback(message)` for each message of `topic`.
@@ -211,6 +212,10 @@ class Node(ParameterMethods):
         and arrival, as in rclpy.
 
         raw: passes the message's bytes in CDR.
+
+        passive: the callback only updates what the node knows; it publishes, logs, calls and starts
+        nothing (publishing and calling raise `GraphError`). The machines of a divided run then need
+        not wait for each other at its messages. Without effect for a node with a latency.
 
         qos_profile: has an effect where messages arrive faster than the node processes them, which
         is possible only in a process of its own. A depth keeps that many of the newest; see
@@ -231,7 +236,9 @@ class Node(ParameterMethods):
             call = partial(handle.call, received, published.time_ns, self.__now_ns())
             self.__run(call, occasion)
 
-        subscription: Subscription = graph.subscribe(name, receive, msg_type, qos=profile)
+        subscription: Subscription = graph.subscribe(
+            name, receive, msg_type, qos=profile, passive=passive and self.__executor is None
+        )
         handle.attach(subscription)
         self.__handles[handle] = handle.cancel
         if moves:
