@@ -30,7 +30,12 @@ from numba.core import sigutils
 from numba.core.ccallback import CFunc
 
 from volery.core.kernel_cache import LOCATORS, KernelCache
-from volery.core.private_folders import UnsafeFolderError, private_folder, temporary_folder
+from volery.core.private_folders import (
+    UnsafeFolderError,
+    is_safe_to_read,
+    private_folder,
+    temporary_folder,
+)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -102,9 +107,13 @@ def _sweep(root: Path, keep: Path) -> None:
 def cache_dir() -> Path:
     """Returns the folder of compiled kernels, which only this user can write: kernels are code.
 
-    It is temporary if the cache is not writable, or if another user can write it.
+    A cache that was compiled for all users, as in a container image, is read-only: what it lacks is
+    compiled in each process. The folder is temporary if the cache is not writable and lacks all, or
+    if another user can write it.
     """
     root, key = cache_root(), _cache_key()
+    if is_safe_to_read(root / "kernels" / key):
+        return root / "kernels" / key
     try:
         folder = private_folder(root.parent, root.name, "kernels", key)
         with tempfile.TemporaryFile(dir=folder):

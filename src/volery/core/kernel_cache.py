@@ -8,9 +8,12 @@ takes a fifth of a start of Volery and serves only a compilation.
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba.core import caching
 from numba.core.runtime.nrt import rtsys
 
@@ -19,6 +22,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 _LOCATOR: Any = caching.UserProvidedCacheLocator
 _CACHE: Any = caching.FunctionCache
 _RUNTIME: Any = rtsys
+_CONFIG: Any = numba.config
 
 
 class KernelLocator(_LOCATOR):  # type: ignore[misc]
@@ -32,6 +36,11 @@ class KernelLocator(_LOCATOR):  # type: ignore[misc]
             subpath: str = super().get_suitable_cache_subpath(py_file)
             return subpath
         return ".".join((_PACKAGE.name, *folder.relative_to(_PACKAGE).parts))
+
+    def ensure_cache_path(self) -> None:
+        """Makes the subfolder, unless the cache is read-only."""
+        if os.access(_CONFIG.CACHE_DIR, os.W_OK):
+            super().ensure_cache_path()
 
 
 LOCATORS = f"{__name__}.{KernelLocator.__name__},IPythonCacheLocator"
@@ -50,3 +59,8 @@ class KernelCache(_CACHE):  # type: ignore[misc]
         _RUNTIME.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Stores the code of a signature, if the cache is writable and the disk has room."""
+        with suppress(OSError):
+            super().save_overload(sig, data)

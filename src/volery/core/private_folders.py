@@ -105,6 +105,18 @@ def check_above(folder: Path) -> None:
             raise UnsafeFolderError(f"other users can write {directory}")
 
 
+def is_safe_to_read(folder: Path) -> bool:
+    """Returns whether a folder exists that only root could write, and this process cannot.
+
+    Such a folder is part of a container image or mounted read-only; see `check_above`.
+    """
+    try:
+        check_above(folder.absolute().resolve())
+    except OSError:
+        return False
+    return folder.is_dir() and not os.access(folder, os.W_OK)
+
+
 def check_own_file(path: Path) -> None:
     """Raises `UnsafeFolderError` if another user can write or exchange an existing file.
 

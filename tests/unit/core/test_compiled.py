@@ -10,8 +10,11 @@ import tempfile
 from enum import EnumType
 from pathlib import Path
 
+import pytest
+
 from volery.core import compiled
 from volery.core.kernel_cache import KernelLocator
+from volery.grading.sandbox import bubblewrap
 
 _TWO_KERNELS = """
 import sys
@@ -45,6 +48,14 @@ from volery.core.rotation_kernels import moved_points
 half_turn = np.array([0.0, 0.0, 1.0, 0.0])
 moved = moved_points(np.array([[1.0, 2.0, 3.0]]), half_turn, np.zeros(3))
 print(*moved[0], sum(moved_points.stats.cache_hits.values()), sys.modules["volery"].__file__)
+"""
+
+_QUANTILE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from volery.core.rng import normal_quantile
+
+print(round(normal_quantile(0.975), 3), sum(normal_quantile.stats.cache_hits.values()))
 """
 
 _LOADED = """
@@ -215,3 +226,24 @@ def test_a_kernel_from_the_cache_needs_no_compiler(tmp_path):
         for _ in range(2)
     ]
     assert lines == ["True 0", "False 1"]
+
+
+@pytest.mark.skipif(bubblewrap() is None, reason="needs bubblewrap: apt-get install bubblewrap")
+def test_a_read_only_cache_serves_what_it_has(tmp_path):
+    """As in a container image: other kernels are compiled in each process, and not stored."""
+    cache, copy = tmp_path / "cache", tmp_path / "copy"
+    shutil.copytree(Path(compiled.__file__).parent, copy / "volery" / "core")
+    (copy / "volery" / "__init__.py").touch()
+    walls = ["bwrap", "--dev-bind", "/", "/", "--ro-bind", str(cache), str(cache)]
+    env = {**os.environ, "VOLERY_CACHE_DIR": str(cache)}
+    env.pop("PYTHONPATH", None)
+    outputs = []
+    for words, code in (([], _MOVE), (walls, _MOVE), (walls, _QUANTILE)):
+        command = [*words, sys.executable, "-P", "-c", code, str(copy)]
+        done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        outputs.append(done.stdout.split()[:4])
+    moved = ["-1.0", "-2.0", "3.0"]
+    assert outputs == [[*moved, "0"], [*moved, "1"], ["1.96", "0"]]
+    assert list(cache.rglob("*moved_points*"))
+    assert not list(cache.rglob("*normal_quantile*"))
