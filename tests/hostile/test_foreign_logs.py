@@ -316,11 +316,15 @@ def test_an_operator_reads_no_file_of_the_server(tmp_path: Path, secret: Path) -
                 )
                 assert response["success"], response
             server.wait_until(
-                lambda status: status["state"] == "flying" and "may be read" in status["message"]
+                lambda status, log=log: (
+                    status["state"] == "flying"
+                    and log.name in status["message"]
+                    and "may be read" in status["message"]
+                )
             )
             assert server.status["scenario"] == "hover"
             shown = json.dumps(server.status) + "\n".join(server.lines)
             assert first_line not in shown
-            assert "root" not in server.status["message"]
+            assert "root:" not in server.status["message"]
     finally:
         server.end(signal.SIGKILL)

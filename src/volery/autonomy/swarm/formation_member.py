@@ -336,7 +336,8 @@ class FormationMember(SavedAttributes, Node):
         position = np.array([birds[name][0] for name in names]) / self._span
         velocity = np.array([birds[name][1] for name in names]) * self._step_s / self._span
         joining = np.array([birds[name][2] is MemberPhase.JOIN for name in names])
-        return np.concatenate((position.T, velocity.T)), joining, names.index(self._own_name)
+        flock = np.ascontiguousarray(np.hstack((position, velocity)).T)
+        return flock, joining, names.index(self._own_name)
 
     def _publish_status(self) -> None:
         now_ns = self.get_clock().now_ns()
