@@ -170,6 +170,7 @@ class Leader:
         """At a barrier, receives what the workers' timers have caused."""
         if self._has_responses or self._barriers.is_due():
             if self._has_timers or not self._has_responses:
+                self._send_early()
                 self._receive()
             self._hold_abandoned()
             self._has_responses = self._has_timers = False

@@ -60,7 +60,7 @@ class Worker:
         """
         barriers = self._barriers
         while barriers.is_open:
-            kind, *rest = self._waiting or self._link.receive()
+            kind, *rest = self._waiting or self._receive()
             self._waiting = None
             if kind == "end":
                 raise RunEndedError(str(rest[0]))
@@ -85,10 +85,7 @@ class Worker:
             return
         self._has_responses = True
         self._send()
-        frame = self._link.receive()
-        while frame[0] == EARLY:
-            self._inbox.apply(frame[1])
-            frame = self._link.receive()
+        frame = self._receive()
         if frame[0] != RESPONSES:  # no timers anywhere: the next tick begins
             self._waiting = frame
             return
@@ -106,6 +103,12 @@ class Worker:
 
     def end_round(self) -> None:
         """Does nothing: a worker has no clients."""
+
+    def _receive(self) -> Frame:
+        """Returns the next frame of the leader; applies the early ones before it."""
+        while (frame := self._link.receive())[0] == EARLY:
+            self._inbox.apply(frame[1])
+        return frame
 
     def _send(self) -> None:
         """Sends what has been published here, unless a lost worker has done so."""
