@@ -8,6 +8,7 @@ that those in later slots plan with it. Birds, steps and lengths are those of `v
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -71,6 +72,7 @@ class MemberPhase(StrEnum):
 
 _FLYING = (MemberPhase.SEARCH, MemberPhase.JOIN)
 _MOVING = {MemberPhase.READY, *_FLYING}
+_GATHERING = {MemberPhase.GATHER, MemberPhase.READY}
 
 
 class _Mate(NamedTuple):
@@ -136,10 +138,11 @@ class FormationMember(SavedAttributes, Node):
         if len(middle) not in (0, 2) or not np.isfinite(middle).all():
             raise PlanError("parameter start_m must be [x, y] or empty")
 
-        row = sorted(self._names).index(self._own_name)
-        start = random_start(len(self._names), seed)
-        self._start = np.array(middle) + self._span * start.positions[row] if middle else None
-        """(2,) m, map: where the UAV waits for the others."""
+        names, start = sorted(self._names), random_start(len(self._names), seed)
+        row = names.index(self._own_name)
+        self._starts = _starts_around(middle, names, self._span * start.positions)
+        """(2,) m, map: where each UAV waits for the others; empty: where it has taken off."""
+        self._start = self._starts.get(self._own_name)
         self._first_velocity = start.velocities[row] * self._span / self._step_s
         self._height = height + height_step * (row % 2)
         self._slot_ns = ns_from_s(_SLOTS * self._step_s * row / len(self._names))
@@ -243,9 +246,12 @@ class FormationMember(SavedAttributes, Node):
                 self._anchor, self._velocity = self._start, self._first_velocity
                 self._publish_status()
         elif self.phase is MemberPhase.READY:
+            assert self._start is not None
             self._anchor_ns = now_ns
             step = now_ns // self._step_ns
-            if step != self._step and self._is_team_ready(now_ns):
+            if np.abs(position - self._start).max() > 2.0 * NEAR_M:
+                self.phase = MemberPhase.GATHER  # it has made way for others
+            elif step != self._step and self._is_team_ready(now_ns):
                 self._set_off(now_ns)
             self._step = step
         else:
@@ -289,22 +295,29 @@ class FormationMember(SavedAttributes, Node):
         self.phase = MemberPhase.JOIN if self._planner.is_joining else MemberPhase.SEARCH
 
     def _steer(self, now_ns: int, position: Array, velocity: Array) -> None:
-        """Commands the UAV towards its bird; on the way to the start, past the others."""
-        if self.phase is MemberPhase.GATHER:
-            assert self._start is not None
-            mates = self._mates.values()
-            at = np.array([position, *(mate.position for mate in mates)])
-            moving = np.array([velocity, *(mate.velocity for mate in mates)])
-            moving[1:][[mate.phase is MemberPhase.READY for mate in mates]] = 0.0
-            wanted = np.zeros_like(at)
-            wanted[0] = GAIN * (self._start - position)
-            flock = flock_within(at, moving, self._avoidance.radius_m)
-            level = self._avoidance.velocities(flock, wanted, Surroundings())[0]
-        elif self.phase is MemberPhase.READY:
-            level = GAIN * (self._anchor - position)
+        """Commands the UAV towards its bird."""
+        if self.phase in _GATHERING:
+            level = self._towards_start(position, velocity)
         else:
             level = self._velocity + GAIN * (self._bird_at(now_ns) - position)
         self._link.command(0, limited(level, OVERSPEED * self._max_speed), self._height)
+
+    def _towards_start(self, position: Array, velocity: Array) -> Array:
+        """Returns the velocity (2,) m/s to the start position, past the others.
+
+        All know the starts of all, so that those that have arrived make way for the others.
+        """
+        assert self._start is not None
+        at, moving, starts = [position], [velocity], [self._start]
+        for name, mate in self._mates.items():
+            motion = np.zeros(2) if mate.phase is MemberPhase.READY else mate.velocity
+            goal = mate.position + motion / GAIN
+            at.append(mate.position)
+            moving.append(motion)
+            starts.append(self._starts.get(name, goal) if mate.phase in _GATHERING else goal)
+        wanted = GAIN * (np.array(starts) - np.array(at))
+        flock = flock_within(np.array(at), np.array(moving), self._avoidance.radius_m)
+        return np.asarray(self._avoidance.velocities(flock, wanted, Surroundings())[0])
 
     # --------------------------------------------------------------------------------- inside
 
@@ -353,3 +366,10 @@ class FormationMember(SavedAttributes, Node):
             "time_to_v_s": None if self._solved_ns < 0 else self._solved_ns / NS_PER_S,
         }
         self._last_status = publish_status(self._status, status, self._last_status)
+
+
+def _starts_around(
+    middle: Sequence[float], names: Sequence[str], offsets: Array
+) -> dict[str, Array]:
+    """Returns the start positions (2,) m of all UAVs by name; empty without a middle."""
+    return dict(zip(names, np.array(middle) + offsets, strict=True)) if middle else {}

@@ -171,6 +171,15 @@ def test_a_uav_that_hears_none_sets_off_never_and_one_without_start_gathers_not(
     np.testing.assert_allclose(team.positions[:, 0], [-5.0, 5.0], atol=0.1)
 
 
+@pytest.mark.parametrize("seed", range(2, 10))
+def test_uavs_that_have_arrived_make_way_for_the_others(seed):
+    team = Team(seed=seed)
+    team.fly_until(
+        lambda: all(node.phase in (MemberPhase.SEARCH, MemberPhase.JOIN) for node in team.nodes),
+        seconds=100.0,
+    )
+
+
 def test_a_team_waits_a_minute_for_one_that_it_does_not_hear():
     team = Team(count=3)
     team.silent = {2}
