@@ -45,6 +45,8 @@ REPORT = "volery_interfaces/msg/TeamReport"
 _PERIOD_S, _REPORT_S = 0.05, 0.2
 _SILENCE_S = 2.0
 """Time without reports after which a UAV counts as lost."""
+_BLOCKED_S = 10.0
+"""Time without progress after which a UAV waits where it is, not at its start position."""
 _WAIT_S = 60.0
 """Time at the start position after which a UAV no longer waits for those that it does not hear."""
 _SLOTS = 0.8
@@ -163,11 +165,11 @@ class FormationMember(SavedAttributes, Node):
         self._step = -1
         """Number of the present step since the beginning of the clock."""
         self._mates: dict[str, _Mate] = {}
+        self._progress = math.inf, 0
+        """Least distance from the start position so far, m, and the time of that, ns."""
         self._ready_ns = 0
         """Time at which the UAV was at its start position, ns."""
-        self._reported_ns = -NS_PER_S
-        self._solved_ns = -1
-        self._last_status = ""
+        self._reported_ns, self._solved_ns, self._last_status = -NS_PER_S, -1, ""
 
         self._link = TeamLink(self, [self._own_name], odometry, height)
         self._reports = self.create_publisher(message_type(REPORT), "team", 5)
@@ -241,6 +243,7 @@ class FormationMember(SavedAttributes, Node):
             assert self._start is not None
             self._anchor, self._anchor_ns, self._velocity = position, now_ns, velocity
             self._step = now_ns // self._step_ns
+            self._start = self._reachable_start(now_ns, position)
             if np.abs(position - self._start).max() < NEAR_M:
                 self.phase, self._ready_ns = MemberPhase.READY, now_ns
                 self._anchor, self._velocity = self._start, self._first_velocity
@@ -249,14 +252,26 @@ class FormationMember(SavedAttributes, Node):
             assert self._start is not None
             self._anchor_ns = now_ns
             step = now_ns // self._step_ns
-            if np.abs(position - self._start).max() > 2.0 * NEAR_M:
+            if np.abs(position - self._start).max() > NEAR_M:
                 self.phase = MemberPhase.GATHER  # it has made way for others
+                self._progress = math.inf, now_ns
             elif step != self._step and self._is_team_ready(now_ns):
                 self._set_off(now_ns)
             self._step = step
         else:
             self._fly(now_ns, position)
         self._steer(now_ns, position, velocity)
+
+    def _reachable_start(self, now_ns: int, position: Array) -> Array:
+        """Returns the start position (2,) m, or the present one if others block the way there."""
+        assert self._start is not None
+        distance = math.dist(self._start, position)
+        least, since_ns = self._progress
+        if distance < least - NEAR_M:
+            self._progress = distance, now_ns
+        elif now_ns - since_ns > ns_from_s(_BLOCKED_S):
+            return position.copy()
+        return self._start
 
     def _is_team_ready(self, now_ns: int) -> bool:
         """Returns whether all wait at their starts, or one of them has set off."""
@@ -314,7 +329,8 @@ class FormationMember(SavedAttributes, Node):
             goal = mate.position + motion / GAIN
             at.append(mate.position)
             moving.append(motion)
-            starts.append(self._starts.get(name, goal) if mate.phase in _GATHERING else goal)
+            is_on_its_way = mate.phase is MemberPhase.GATHER
+            starts.append(self._starts.get(name, goal) if is_on_its_way else goal)
         wanted = GAIN * (np.array(starts) - np.array(at))
         flock = flock_within(np.array(at), np.array(moving), self._avoidance.radius_m)
         return np.asarray(self._avoidance.velocities(flock, wanted, Surroundings())[0])

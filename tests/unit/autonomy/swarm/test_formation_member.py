@@ -180,6 +180,17 @@ def test_uavs_that_have_arrived_make_way_for_the_others(seed):
     )
 
 
+def test_a_uav_whose_way_to_its_start_is_blocked_waits_where_it_is():
+    team = Team(count=2)
+    held, phases = team.positions[0].copy(), []
+    for _ in range(30):
+        team.fly(1.0)
+        team.positions[0] = held
+        phases.append(team.nodes[0].phase)
+    assert phases[8] is MemberPhase.GATHER
+    assert phases[-1] in (MemberPhase.SEARCH, MemberPhase.JOIN)
+
+
 def test_a_team_waits_a_minute_for_one_that_it_does_not_hear():
     team = Team(count=3)
     team.silent = {2}
